@@ -71,10 +71,16 @@ export class Client {
   async restore(snapshot, signal, patience) {
     if (patience !== undefined) checkNumber("patience", patience);
     const session = await this.create({ ...restoring(await bytesOf(frameOf(snapshot))), signal, patience });
-    // What opens a session does not tell the score.
-    const response = await this.transport.call("GET", `sessions/${session.id}`, { signal, patience });
-    session.take((await documentOf(response, "answer")).answer);
-    return session;
+    try {
+      // What opens a session does not tell the score.
+      const response = await this.transport.call("GET", `sessions/${session.id}`, { signal, patience });
+      session.take((await documentOf(response, "answer")).answer);
+      return session;
+    } catch (error) {
+      // Nobody else knows its id.
+      session.end().catch(() => undefined);
+      throw error;
+    }
   }
 
   /**

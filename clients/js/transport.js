@@ -97,11 +97,15 @@ function retryAfter(headers) {
   return until && Math.max(0, (until - now) / 1000);
 }
 
+/** The three forms of a date in HTTP (RFC 9110, 5.6.7). Without them `parse` takes much for a date. */
+const DATE = /^(\w{3}, \d\d \w{3} \d{4}|\w{6,9}, \d\d-\w{3}-\d\d) [\d:]{8} GMT$|^\w{3} \w{3} [ \d]\d [\d:]{8} \d{4}$/;
+
 /** Milliseconds; nothing where it is no date.
  * @param {string | null} said */
 function dateOf(said) {
-  // Without its form `parse` takes much for a date.
-  return /^\w{3}, .* GMT$/.test(said ?? "") ? Date.parse(said ?? "") || undefined : undefined;
+  if (!said || !DATE.test(said)) return undefined;
+  // The last form names no zone.
+  return Date.parse(said.endsWith("GMT") ? said : `${said} GMT`) || undefined;
 }
 
 /** No answer came. Node.js tells why; browsers do not.

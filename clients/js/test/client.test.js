@@ -46,6 +46,57 @@ test("an address or a key that no request takes is told at once, and a key is no
   await (await new Client(service.url, { key: "the-key-of-a-file\n" }).open(frame, clip.box)).end();
 });
 
+/** A server that answers with this.
+ * @param {import("node:http").RequestListener} answer */
+async function answering(answer) {
+  const server = createServer(answer);
+  await new Promise((resolve) => server.listen(0, "127.0.0.1", () => resolve(undefined)));
+  const url = `http://127.0.0.1:${/** @type {any} */ (server.address()).port}`;
+  const close = () => {
+    server.close();
+    server.closeAllConnections();
+  };
+  return { url, close };
+}
+
+// Of HTTP's three forms the first alone was read.
+test("a date after which to try again is read in each of its forms", async () => {
+  const dates = ["Sun, 06 Nov 1994 08:49:37 GMT", "Sunday, 06-Nov-94 08:49:37 GMT", "Sun Nov  6 08:49:37 1994"];
+  const said = [...dates.map((date) => [date, 7]), ["Sunday"], ["11/6/94"]];
+  for (const [after, seconds] of said) {
+    const headers = { "Retry-After": String(after), Date: "Sun, 06 Nov 1994 08:49:30 GMT" };
+    const server = await answering((_, response) => void response.writeHead(503, headers).end());
+    const problem = await new Client(server.url, { patience: 0 }).open(clip.frames[0], clip.box).catch((error) => error);
+    assert.equal(problem.retryAfter, seconds, String(after));
+    server.close();
+  }
+});
+
+// It stayed there until it expired.
+test("a session that cannot be read once it is restored is ended", async () => {
+  const session = await new Client(service.url).open(clip.frames[0], clip.box, options);
+  const snapshot = await session.snapshot();
+  await session.end();
+  const asked = /** @type {string[]} */ ([]);
+  let tell = () => undefined;
+  const ended = new Promise((resolve) => (tell = () => resolve(undefined)));
+  const between = await answering((request, response) => {
+    const { method = "", url: path, headers } = request;
+    asked.push(method);
+    if (method === "GET") return void response.writeHead(500).end();
+    const passed = forward({ host: "127.0.0.1", port: service.port, method, path, headers }, (answer) => {
+      response.writeHead(answer.statusCode ?? 502, answer.headers);
+      answer.pipe(response);
+      if (method === "DELETE") tell();
+    });
+    request.pipe(passed);
+  });
+  await assert.rejects(new Client(between.url).restore(snapshot), { status: 500 });
+  await ended;
+  assert.deepEqual(asked, ["PUT", "GET", "DELETE"]);
+  between.close();
+});
+
 test("a patience and other numbers that are none are refused", async () => {
   const wrong = /** @type {any[]} */ (["20s", "20000", NaN, -1, {}, true]);
   const client = new Client(service.url, { patience: Infinity, snapshotEvery: 0 });
