@@ -332,6 +332,7 @@ async function wake(run, open) {
     // It can be tried again; where the run has failed meanwhile, with the source opened anew.
     run.wake ??= own;
     run.isResting = true;
+    run.leaveSessions();
     throw error;
   }
 }

@@ -106,13 +106,15 @@ export class Run {
   /** Follows another object, from the picture that was answered last.
    * @param {Box} box */
   async add(box) {
+    const { picture } = this;
     const object = this.newObject();
-    const answer = await object.follower.open(this.picture, box);
+    const answer = await object.follower.open(picture, box);
     if (this.isOver) return object.follower.end();
     this.take(object);
-    this.frames.keep(this.picture);
-    this.note(object, answer, this.picture, true);
-    this.told.answer(this.picture, answer);
+    this.frames.keep(picture);
+    this.note(object, answer, picture, true);
+    this.leaveSessions();
+    this.told.answer(picture, answer);
   }
 
   newObject() {
@@ -265,7 +267,7 @@ export class Run {
       await track();
     } finally {
       this.isRedoing = false;
-      if (this.isResting && !this.isLocal) this.objects.forEach(({ follower }) => follower.end());
+      this.leaveSessions();
       this.throttle();
     }
     this.checkEnd();
@@ -303,6 +305,11 @@ export class Run {
   rest() {
     this.isResting = true;
     this.source.stop();
-    if (!this.isLocal) this.objects.forEach(({ follower }) => follower.end());
+    this.leaveSessions();
+  }
+
+  /** Ends the service's sessions of a run that takes no more frames. One that goes on opens others. */
+  leaveSessions() {
+    if (this.isResting && !this.isLocal) this.objects.forEach(({ follower }) => follower.end());
   }
 }

@@ -65,7 +65,12 @@ async function bringBack(run, object, { rows = new Map(), saves, last, follower,
     draft.rows = new Map([...rows, ...[...object.rows].filter(([frame]) => frame > last)]);
     draft.sort();
     draft.saves = [...saves, ...object.saves.filter(({ after = -1 }) => isSame && after > last)];
-    if (isAnew) await (await import("./again.js")).catchUp(run, draft, last);
+    try {
+      if (isAnew) await (await import("./again.js")).catchUp(run, draft, last);
+    } catch (error) {
+      if (isAnew) draft.follower.end();
+      throw error;
+    }
     if (!deleted && !run.objects.includes(object)) return draft.follower.end();
     if (isAnew) object.follower.end();
     [object.follower, object.frames, object.rows, object.saves] = [draft.follower, draft.frames, draft.rows, draft.saves];

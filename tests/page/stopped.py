@@ -1,6 +1,7 @@
 """Runs that are stopped, and services that were: what was tracked is shown, corrected, and goes on."""
 
 import pathlib
+import re
 
 from browser import choose, drag, frames, kept_rows, near, numbers, rows, said, slow, to_the_end, was_said
 from clips import FRAMES, H264
@@ -162,6 +163,53 @@ def failed_after_it_was_left(checks):
     page.context.close()
 
 
+PROBLEM = {"status": 500, "content_type": "application/problem+json", "body": '{"status": 500}'}
+
+
+def no_session_is_left(checks):
+    """Where a run is stopped or fails while its sessions are opened, the service keeps none of them."""
+    service = Service(checks.program)
+    page = checks.page(url=service.url, allowed=("500",))
+    truth = checks.clips["card"]["truth"]
+    held = []
+    opening = "**/sessions/*?*box=*"
+    page.route(opening, lambda route: held.append(route))
+    choose(page, "card")
+    with page.expect_request(opening):
+        drag(page, truth[0])
+    page.locator("#stop").click()
+    with page.expect_response(opening):
+        held[0].continue_()
+    service.wait_for_no_session()
+    page.unroute(opening)
+    page.locator("#resume").click()
+    frames(page, 40)
+    page.locator("#pause").click()
+    page.locator("#add").click()
+    drag(page, OFF)
+    page.locator("#list li:nth-child(2)").wait_for()
+    page.locator("#stop").click()
+    service.wait_for_no_session()
+    opened = []
+
+    def answer(route):
+        """The first object is followed again, the second is not."""
+        if route.request.method == "PUT":
+            opened.append(route.request.url)
+        if len(opened) > 1 and route.request.method == "PUT":
+            route.fulfill(**PROBLEM)
+        else:
+            route.continue_()
+
+    page.route(re.compile(r"/sessions/[^/]+$"), answer)
+    page.locator("#resume").click()
+    page.locator("#message.bad").wait_for()
+    assert len(opened) == 2, opened
+    service.wait_for_no_session()
+    page.context.close()
+    service.stop()
+
+
 def drawn_before_it_is_shown(checks):
     """A box that is drawn while the frame where to begin is on its way is of the one that is still shown."""
     page = checks.page(where="here")
@@ -217,6 +265,7 @@ ALL = [
     gone_on_after_a_stop,
     stopped_after_a_reload,
     failed_after_it_was_left,
+    no_session_is_left,
     drawn_before_it_is_shown,
     played_again,
 ]
