@@ -228,6 +228,9 @@ export class VideoFile {
       video.play().catch((error) => error.name === "AbortError" || this.fail(error));
     } else if (!video.paused) {
       video.pause();
+    } else if (video.ended && !isBusy) {
+      // One that was gone to does not tell its end.
+      this.ended();
     }
   }
 

@@ -87,6 +87,26 @@ def vp8_file(checks):
     whole_file(checks, checks.files.file("clip, of \"VP8\".webm", 25, VP8), 25)
 
 
+def cut_file(checks):
+    """A recording that broke off is tracked as far as it goes, and ends there. It was waited for without end, also
+    where its end is where one begins."""
+    whole = checks.files.file("whole.mkv", 30, H264).read_bytes()
+    path = checks.files.folder / "cut.mkv"
+    path.write_bytes(whole[: len(whole) * 3 // 4])
+    for begins_at_its_end in (False, True):
+        page = checks.page(where="here")
+        choose_file(page, path)
+        if begins_at_its_end:
+            page.locator("#begin-at").focus()
+            page.keyboard.press("End")
+            page.locator("#begin-time").filter(has_text="frame").wait_for()
+        drag(page, sent_box(checks.files.truth[0]))
+        to_the_end(page)
+        count = len(rows(page))
+        assert count == 1 if begins_at_its_end else FRAMES / 2 < count < FRAMES, count
+        page.context.close()
+
+
 def whole_file(checks, path, rate):
     page = checks.page()
     follow_file(checks, page, path)
@@ -232,6 +252,7 @@ def plain_http(checks):
 ALL = [
     h264_file,
     vp8_file,
+    cut_file,
     file_of_varying_rate,
     file_of_a_phone,
     file_with_corrections,
