@@ -58,6 +58,7 @@ addEventListener("click", ({ target, detail }) => {
 input("see").addEventListener("change", () => {
   if (page.run) page.run.sees = page.seen.isOn;
   page.seen.fit();
+  page.repaint();
 });
 addEventListener("click", ({ target }) => {
   const sources = /** @type {HTMLDetailsElement} */ (get("sources"));

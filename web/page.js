@@ -258,7 +258,7 @@ export class Page {
   }
 
   repaint() {
-    const isLast = !this.viewed && this.seen.shown === this.run?.chosen;
+    const isLast = this.seen.isOn && !this.viewed && this.seen.shown === this.run?.chosen;
     if (this.hasRows && this.shown) this.show(this.shown, isLast ? this.particles : undefined);
   }
 

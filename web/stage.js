@@ -20,6 +20,8 @@ const DARK = "#0b0c0f";
 const OUTSIDE = "#0b0c0f73";
 /** Pixels of the screen in the width of a picture that is not on a screen. */
 const USUAL_WIDTH = 640;
+/** Of a name in the picture. The list has the whole of it. */
+const MOST_LETTERS = 24;
 
 export class Stage {
   /**
@@ -132,7 +134,7 @@ export function paintBox(context, { box, color, name, isLost, isChosen }, unit =
   if (name) paintName(context, name, x, y, isChosen ? [color, DARK] : [`${DARK}cc`, color], unit);
 }
 
-/** Paints a name over the upper left corner of a box; inside where there is no room over it.
+/** Paints a name over the upper left corner of a box; inside where there is no room over it. It stays in the picture.
  * @param {CanvasRenderingContext2D} context
  * @param {string} name
  * @param {number} x
@@ -140,14 +142,17 @@ export function paintBox(context, { box, color, name, isLost, isChosen }, unit =
  * @param {string[]} colors Of the ground and of the text.
  * @param {number} unit */
 function paintName(context, name, x, y, [ground, text], unit) {
+  const letters = [...name];
+  const short = letters.length > MOST_LETTERS ? `${letters.slice(0, MOST_LETTERS - 1).join("").trimEnd()}…` : name;
   context.font = `600 ${12 * unit}px system-ui, sans-serif`;
-  const [width, height] = [context.measureText(name).width + 12 * unit, 20 * unit];
-  const [left, top] = [Math.max(0, x - unit), y < height + 4 * unit ? Math.max(0, y) + 4 * unit : y - height - 4 * unit];
+  const [width, height] = [context.measureText(short).width + 12 * unit, 20 * unit];
+  const most = context.canvas.width / context.getTransform().a - width;
+  const [left, top] = [Math.max(0, Math.min(x - unit, most)), y < height + 4 * unit ? Math.max(0, y) + 4 * unit : y - height - 4 * unit];
   context.fillStyle = ground;
   context.beginPath();
   context.roundRect(left, top, width, height, 5 * unit);
   context.fill();
   context.fillStyle = text;
   context.textBaseline = "middle";
-  context.fillText(name, left + 6 * unit, top + height / 2);
+  context.fillText(short, left + 6 * unit, top + height / 2);
 }

@@ -20,8 +20,11 @@ from browser import (
     rows,
     said,
     saved,
+    slow,
     to_the_end,
 )
+from clips import H264
+from files import choose_file, sent_box
 from service import Service
 
 CORRECTED = 100
@@ -226,4 +229,65 @@ def saved_to_the_service(checks):
         service.stop()
 
 
-ALL = [objects_in_the_page, objects_with_the_service, tracked_backwards, saved_to_the_service]
+FARTHEST = """() => {
+    const own = CanvasRenderingContext2D.prototype.roundRect;
+    window.farthest = 0;
+    CanvasRenderingContext2D.prototype.roundRect = function (x, y, width, ...rest) {
+        const right = ((x + width) * this.getTransform().a) / this.canvas.width;
+        if (this.canvas.id === "overlay") window.farthest = Math.max(window.farthest, right);
+        return own.call(this, x, y, width, ...rest);
+    };
+}"""
+"""Notes how far to the right boxes and names are painted, as a share of the picture's width."""
+
+
+def long_names(checks):
+    """The name of a file and of an object, longer than there is room: nothing runs over the edge, of the page or of the
+    picture."""
+    short = checks.files.file("clip.mp4", 30, H264)
+    path = short.with_name("a_recording_of_the_whole_" + 8 * "afternoon_" + ".mp4")
+    path.write_bytes(short.read_bytes())
+    page = checks.page(where="here", viewport={"width": 400, "height": 800})
+    slow(page)
+    choose_file(page, path)
+    drag(page, sent_box(checks.files.truth[0]))
+    frames(page, 10)
+    page.locator("#pause").click()
+    page.locator("#add").click()
+    drag(page, [850, 100, 90, 90])
+    page.evaluate(FARTHEST)
+    page.locator("#list li:nth-child(2) input[type=text]").fill("what stands at the edge of the field " * 3)
+    kept_rows(page)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 400
+    assert 0.9 < page.evaluate("window.farthest") <= 1.001, page.evaluate("window.farthest")
+    page.context.close()
+
+
+def seen_no_more(checks):
+    """What the tracker sees goes from the picture when it is switched off, also of a paused run, and comes back."""
+    page = checks.page(where="here")
+    page.locator("#see").evaluate("box => box.checked || box.click()")
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 20)
+    page.locator("#pause").click()
+    kept_rows(page)
+    over = lambda: page.evaluate("document.getElementById('overlay').toDataURL()")
+    before = over()
+    page.locator("#see").evaluate("box => box.click()")
+    assert over() != before
+    page.locator("#see").evaluate("box => box.click()")
+    assert over() == before
+    page.context.close()
+
+
+def whole_picture(checks):
+    """On a low screen the bar covers nothing of the picture in which one is to draw."""
+    page = checks.page(where="here", viewport={"width": 844, "height": 390}, has_touch=True, is_mobile=True)
+    choose_file(page, checks.files.file("clip.mp4", 30, H264))
+    picture, controls = (page.locator(name).bounding_box() for name in ("#picture", "#controls"))
+    assert picture["y"] >= 0 and picture["y"] + picture["height"] <= controls["y"], (picture, controls)
+    page.context.close()
+
+
+ALL = [objects_in_the_page, objects_with_the_service, tracked_backwards, saved_to_the_service, long_names, seen_no_more, whole_picture]
