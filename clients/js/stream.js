@@ -106,6 +106,9 @@ export class FrameStream {
     this.resolveEnded = () => undefined;
     /** @type {Promise<Error | undefined>} The stream has ended: why, if it was not by `close`. */
     this.ended = new Promise((resolve) => (this.resolveEnded = resolve));
+    /** Browsers tell when the network goes. A socket does not, for long. */
+    this.offline = () => this.drop();
+    globalThis.addEventListener?.("offline", this.offline);
     session.hold(this);
     this.resendFrom(session.frame + 1);
     // The service may have these, of a stream before this one: it tells.
@@ -167,14 +170,17 @@ export class FrameStream {
     const { socket } = this;
     if (!socket || (this.isUp && this.sent === 0)) return;
     const bytes = this.waiting.slice(0, this.sent).reduce((sum, sent) => sum + sentFrame(sent).length, 0);
-    const end = () => {
-      if (this.socket !== socket) return;
-      this.socket = undefined;
-      socket.close();
-      this.closed(ABNORMAL);
-    };
     // The service itself lets a frame wait for half of it.
-    this.silence = setTimeout(end, 2 * longest(bytes));
+    this.silence = setTimeout(() => this.socket === socket && this.drop(), 2 * longest(bytes));
+  }
+
+  /** Takes the line for broken. */
+  drop() {
+    const { socket } = this;
+    if (!socket) return;
+    this.socket = undefined;
+    socket.close();
+    this.closed(ABNORMAL);
   }
 
   /** Reads a frame that may be a file, and goes on. A socket that cannot read it would not tell.
@@ -438,6 +444,7 @@ export class FrameStream {
   end(problem) {
     if (this.isEnded) return;
     clearTimeout(this.silence);
+    globalThis.removeEventListener?.("offline", this.offline);
     this.isEnded = true;
     this.isUp = false;
     const { socket } = this;

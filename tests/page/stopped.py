@@ -210,6 +210,24 @@ def no_session_is_left(checks):
     service.stop()
 
 
+def offline(checks):
+    """A machine that has lost its network is told of it at once, and goes on when it has one again. The socket tells
+    nothing for a minute."""
+    page = checks.page(allowed=("ERR_INTERNET_DISCONNECTED", "WebSocket"))
+    page.set_default_timeout(30_000)
+    hurry = slow(page)
+    choose_file(page, checks.files.file("clip.mp4", 30, H264))
+    drag(page, sent_box(checks.files.truth[0]))
+    frames(page, 10)
+    page.context.set_offline(True)
+    page.locator("#message.bad").filter(has_text="The line is broken").wait_for()
+    page.context.set_offline(False)
+    hurry()
+    to_the_end(page)
+    assert [int(row["frame"]) for row in rows(page)] == list(range(FRAMES))
+    page.context.close()
+
+
 def drawn_before_it_is_shown(checks):
     """A box that is drawn while the frame where to begin is on its way is of the one that is still shown."""
     page = checks.page(where="here")
@@ -266,6 +284,7 @@ ALL = [
     stopped_after_a_reload,
     failed_after_it_was_left,
     no_session_is_left,
+    offline,
     drawn_before_it_is_shown,
     played_again,
 ]

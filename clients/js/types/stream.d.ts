@@ -81,6 +81,8 @@ export declare class FrameStream {
     resolveEnded: (problem: Error | undefined) => void;
     /** @type {Promise<Error | undefined>} The stream has ended: why, if it was not by `close`. */
     ended: Promise<Error | undefined>;
+    /** Browsers tell when the network goes. A socket does not, for long. */
+    offline: () => void;
     /**
      * @param {import("./session.js").Session} session
      * @param {StreamOptions} [options]
@@ -105,6 +107,8 @@ export declare class FrameStream {
     transmit(): Promise<void> | undefined;
     /** Takes the line for broken where what is asked for does not come: not every line that breaks tells. */
     listen(): void;
+    /** Takes the line for broken. */
+    drop(): void;
     /** Reads a frame that may be a file, and goes on. A socket that cannot read it would not tell.
      * @param {Waiting} next */
     read(next: Waiting): Promise<void>;
