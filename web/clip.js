@@ -9,15 +9,11 @@ const ATTEMPTS = 6;
 /** @param {string} address */
 async function fetched(address) {
   for (let attempt = 1; ; attempt += 1) {
-    try {
-      const response = await fetch(address);
-      if (!response.ok) throw new Error("The sample clip cannot be loaded.");
-      return response;
-    } catch (error) {
-      // The line may be back in a moment.
-      if (attempt === ATTEMPTS) throw error;
-      await new Promise((resolve) => setTimeout(resolve, 200 * attempt));
-    }
+    const response = await fetch(address).catch(() => undefined);
+    if (response?.ok) return response;
+    if (attempt === ATTEMPTS) throw new Error("The sample clip cannot be loaded. Is the service still running?");
+    // The line may be back in a moment.
+    await new Promise((resolve) => setTimeout(resolve, 200 * attempt));
   }
 }
 

@@ -66,6 +66,8 @@ async function filesIn(entry) {
  * @param {import("./page.js").Resume} [resume] */
 export function offerDecoding(page, file, resume) {
   get("decoding").hidden = false;
+  // What is said may be of another video by now.
+  button("decode").textContent = `Let the service decode ${file.name}`;
   button("decode").onclick = () => {
     const open = async (/** @type {AbortSignal} */ signal) => {
       const tell = (/** @type {number} */ count) => {

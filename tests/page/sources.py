@@ -188,6 +188,7 @@ def decoded_by_the_service(checks):
         said(page, "This browser cannot play old.mp4")
         checks.no_axe_violations(page, "a file that cannot be played")
         assert not uploads, uploads
+        assert page.locator("#decode").inner_text() == "Let the service decode old.mp4"
         page.locator("#decode").click()
         said(page, DRAW)
         assert not page.locator("#decode").is_visible()
@@ -217,6 +218,15 @@ def frames_of_a_gif(checks):
     page.reload()
     said(page, "clip.gif is here again")
     assert rows(page) == table
+    page.context.close()
+
+
+def no_sample(checks):
+    """A sample that does not come, as when the service has gone, is told in words of the page."""
+    page = checks.page(where="here", allowed=("Failed to load",))
+    page.route("**/sample/card/*", lambda route: route.abort())
+    page.locator("#card").click()
+    said(page, "The sample clip cannot be loaded")
     page.context.close()
 
 
@@ -344,5 +354,6 @@ ALL = [
     begun_in_the_middle,
     decoded_by_the_service,
     frames_of_a_gif,
+    no_sample,
     no_video_at_all,
 ]
