@@ -213,6 +213,7 @@ export class Editing {
         run.remove(object);
         if (object === seen.shown || !run.chosen) seen.reset();
         seen.figures(run);
+        if (!run.chosen) this.page.say(TAP + DRAW);
         this.page.isUnsaved = true;
         this.page.repaint();
         this.page.changed();

@@ -14,6 +14,8 @@
  */
 
 const MOST_STEPS = 50;
+/** Of the states in all steps: the oldest steps go where they take more. */
+const MOST_BYTES = 128 << 20;
 
 export class Undoing {
   constructor() {
@@ -33,6 +35,7 @@ export class Undoing {
   /** @param {Step} step */
   push(step) {
     this.steps = [...this.steps, step].slice(-MOST_STEPS);
+    while (this.steps.length > 1 && bytesIn(this.steps) > MOST_BYTES) this.steps.shift();
   }
 
   /** Brings back what was before the last change.
@@ -47,6 +50,13 @@ export class Undoing {
     this.steps = this.steps.filter((other) => other !== step);
     return object?.name;
   }
+}
+
+/** What the states in steps take. Most are in several.
+ * @param {Step[]} steps */
+function bytesIn(steps) {
+  const states = new Set(steps.flatMap(({ saves }) => saves));
+  return [...states].reduce((sum, { bytes }) => sum + bytes.length, 0);
 }
 
 /**

@@ -229,6 +229,26 @@ def states_of_a_long_video(checks):
     page.context.close()
 
 
+STEPS = """async ([count, own, shared]) => {
+    const { Undoing } = await import("/page/undo.js");
+    const undoing = new Undoing();
+    const states = [{ bytes: { length: shared } }];
+    for (let number = 0; number < count; number += 1) {
+        undoing.push({ number, saves: [...states, { bytes: { length: own } }], last: 0 });
+    }
+    return undoing.steps.map(({ number }) => number);
+}"""
+
+
+def memory_of_steps(checks):
+    """The newest steps can be undone: so many as memory allows. What several have takes its bytes once."""
+    page = checks.page()
+    assert page.evaluate(STEPS, [200, 1000, 100 << 20]) == list(range(150, 200))
+    assert page.evaluate(STEPS, [50, 10 << 20, 0]) == list(range(38, 50))
+    assert page.evaluate(STEPS, [3, 500 << 20, 0]) == [2]
+    page.context.close()
+
+
 def added_over_a_slow_line(checks):
     """No frame goes past an object while its session is opened: it has a row of each frame from its box on."""
     page = checks.page()
@@ -305,6 +325,7 @@ ALL = [
     deletion_undone,
     undone_without_the_service,
     states_of_a_long_video,
+    memory_of_steps,
     added_over_a_slow_line,
     box_at_the_edge,
     refused_box,

@@ -2,7 +2,7 @@
 
 import json
 
-from browser import choose, drag, frames, kept_rows, numbers, rows, said, saved, say_nothing, slow, stop, to_the_end
+from browser import DRAW, choose, drag, frames, kept_rows, numbers, rows, said, saved, say_nothing, slow, stop, to_the_end
 from clips import FRAMES, H264
 from files import GRAY, check_rows, choose_file, sent_box
 from studio import to_frame
@@ -341,6 +341,7 @@ def last_object_deleted(checks):
     kept_run(checks, page)
     page.locator("#seen-now").wait_for()
     page.locator("#list .remove").click()
+    said(page, DRAW)
     assert [page.locator(name).inner_text() for name in ("#status", "#score")] == ["–", "–"]
     assert page.locator("#seen-now").is_hidden()
     page.locator("#kept").wait_for(state="hidden")
