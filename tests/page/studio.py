@@ -281,13 +281,42 @@ def seen_no_more(checks):
     page.context.close()
 
 
+ICON = """() => {
+    const button = document.getElementById("pause");
+    return [getComputedStyle(button, "::before").backgroundColor, getComputedStyle(button).color];
+}"""
+
+
+def colors_of_the_system(checks):
+    """Where the system's colours take the place of the page's, icons have that of their text."""
+    page = checks.page(where="here", forced_colors="active")
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 20)
+    page.locator("#pause").click()
+    icon, text = page.evaluate(ICON)
+    assert icon == text, (icon, text)
+    page.context.close()
+
+
 def whole_picture(checks):
-    """On a low screen the bar covers nothing of the picture in which one is to draw."""
+    """On a low screen the bar covers nothing of the picture in which one is to draw, and the first screen is filled."""
     page = checks.page(where="here", viewport={"width": 844, "height": 390}, has_touch=True, is_mobile=True)
+    panel, welcome = (page.locator(name).bounding_box()["width"] for name in (".panel", "#welcome"))
+    assert panel == welcome, (panel, welcome)
     choose_file(page, checks.files.file("clip.mp4", 30, H264))
     picture, controls = (page.locator(name).bounding_box() for name in ("#picture", "#controls"))
     assert picture["y"] >= 0 and picture["y"] + picture["height"] <= controls["y"], (picture, controls)
     page.context.close()
 
 
-ALL = [objects_in_the_page, objects_with_the_service, tracked_backwards, saved_to_the_service, long_names, seen_no_more, whole_picture]
+ALL = [
+    objects_in_the_page,
+    objects_with_the_service,
+    tracked_backwards,
+    saved_to_the_service,
+    long_names,
+    seen_no_more,
+    colors_of_the_system,
+    whole_picture,
+]
