@@ -16,7 +16,6 @@ const ROUNDS: usize = 25;
 /// A parameter: its name, its values, and how it is set.
 type Size = (&'static str, &'static [u32], fn(&mut Params, u32));
 
-/// Prints the table.
 pub fn print() {
     println!(
         "µs of a step, of which but one size is the preset's: over {PERIOD} steps in a row, the mean of each one's median \

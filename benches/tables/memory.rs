@@ -5,7 +5,6 @@ use bagtrack_tracker::{Preset, Tracker};
 
 use crate::{scene, warm};
 
-/// Resident bytes of this process.
 fn resident() -> u64 {
     memory::of_process(std::process::id(), "VmRSS:").unwrap_or(0)
 }

@@ -10,7 +10,6 @@ use crate::{clock, scene, textbook, warm};
 
 const ROUNDS: usize = 300;
 
-/// Prints the table.
 pub fn print() {
     let params = Preset::Paper.params();
     let look = |t: usize, shift: f64| {

@@ -10,7 +10,6 @@ const ROUNDS: usize = 300;
 /// How many frames the copy is behind beside which a state is restored.
 const BEHIND: usize = 3;
 
-/// Prints the table.
 pub fn print() {
     let (mut tracker, frames) = warm(Preset::Robust.params());
     let behind = tracker.clone();

@@ -16,7 +16,6 @@ pub const PERIOD: Duration = Duration::from_millis(40);
 /// After so long a frame counts as lost.
 const LOST: Duration = Duration::from_secs(10);
 
-/// Good clients at work.
 pub struct GoodClients {
     stop: Arc<AtomicBool>,
     clients: JoinSet<Outcome<Tally>>,

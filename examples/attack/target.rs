@@ -12,7 +12,6 @@ use std::time::Duration;
 /// What a server says of its resident memory, before the number.
 const BOUND: &str = "resident memory stays below ";
 
-/// A server.
 pub struct Target {
     pub url: String,
     pub address: SocketAddr,

@@ -18,12 +18,10 @@ pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 pub struct Done {
     /// Of each frame that was answered, in microseconds; in an open loop from when the frame was due.
     pub latencies: Histogram<u64>,
-    /// Seconds that the runs took.
     pub seconds: f64,
 }
 
 impl Done {
-    /// Nothing yet.
     pub fn new() -> Outcome<Self> {
         Ok(Self {
             latencies: Histogram::new(3)?,
@@ -79,7 +77,6 @@ impl Driver {
         }
     }
 
-    /// Where the server is.
     pub fn url(&self) -> &str {
         &self.url
     }
@@ -104,7 +101,6 @@ impl Driver {
         client.build()
     }
 
-    /// Opens a session.
     pub async fn session(&self, client: &Client) -> Result<Session, ClientError> {
         let first = self.pictures[0].clone();
         client.open(first, self.target, &self.options).await
@@ -124,7 +120,6 @@ impl Driver {
     }
 }
 
-/// Open sessions.
 pub struct Clients(Vec<ClientSession>);
 
 impl Clients {
@@ -157,7 +152,6 @@ impl Clients {
         Ok(())
     }
 
-    /// Ends the sessions.
     pub async fn close(self) -> Outcome<()> {
         for client in self.0 {
             client.session.end().await?;
@@ -176,7 +170,6 @@ struct Schedule {
 struct ClientSession {
     session: Session,
     pictures: Vec<Bytes>,
-    /// The picture that is sent next.
     next: usize,
 }
 

@@ -42,7 +42,6 @@ impl Server {
         Ok(())
     }
 
-    /// Where it listens.
     pub fn url(&self) -> String {
         self.0.url("")
     }
@@ -52,7 +51,6 @@ impl Server {
         cpu_time::of_process(self.0.process_id())
     }
 
-    /// Its resident memory in bytes.
     pub fn resident(&self) -> Outcome<u64> {
         let resident = memory::of_process(self.0.process_id(), "VmRSS:");
         Ok(resident.ok_or("/proc: no VmRSS")?)

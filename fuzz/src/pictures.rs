@@ -3,9 +3,7 @@
 use image::{DynamicImage, ImageFormat, Rgb, RgbImage};
 use std::io::Cursor;
 
-/// Width in pixels.
 pub const WIDTH: u32 = 48;
-/// Height in pixels.
 pub const HEIGHT: u32 = 36;
 
 /// Picture `t` in any size, as PNG.
@@ -13,12 +11,10 @@ pub fn pattern(t: u32, width: u32, height: u32) -> Vec<u8> {
     encode(t, width, height, ImageFormat::Png)
 }
 
-/// Picture `t` as PNG.
 pub fn png(t: u32) -> Vec<u8> {
     pattern(t, WIDTH, HEIGHT)
 }
 
-/// Picture `t` as JPEG.
 pub fn jpeg(t: u32) -> Vec<u8> {
     encode(t, WIDTH, HEIGHT, ImageFormat::Jpeg)
 }

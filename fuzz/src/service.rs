@@ -34,7 +34,6 @@ pub struct Service {
     requests: Cell<u32>,
 }
 
-/// An answer.
 pub struct Answer {
     pub status: StatusCode,
     pub headers: HeaderMap,
@@ -42,7 +41,6 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// The body as JSON.
     pub fn json(&self) -> Value {
         serde_json::from_slice(&self.body).expect("the answer is JSON")
     }
@@ -155,7 +153,6 @@ impl Service {
         answer
     }
 
-    /// Sends a request.
     pub fn send(&self, target: (Method, &str), media_type: &str, body: &[u8]) -> Answer {
         self.send_in_pieces(target, media_type, body, body.len())
     }
@@ -186,7 +183,6 @@ impl Service {
         }
     }
 
-    /// Ends a session.
     pub fn delete(&self, session: &str) {
         let deleted = self.send((Method::DELETE, session), "text/plain", b"");
         assert_eq!(deleted.status, StatusCode::NO_CONTENT);

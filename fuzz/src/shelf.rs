@@ -144,7 +144,6 @@ impl ScriptServer for Server {
 }
 
 impl Shelf {
-    /// With nothing in it.
     pub async fn new() -> Self {
         let stored = Place::default();
         let server = Arc::new(Server(stored.clone()));

@@ -20,21 +20,15 @@ pub(crate) const TIMEOUT: Duration = Duration::from_secs(5);
 /// A caller.
 #[derive(Debug)]
 pub struct Caller {
-    /// Its name.
     pub name: String,
-    /// Sends its requests.
     pub client: Client,
     /// Its way to the replicas, for streams.
     pub wire: Wire,
     /// The share of its sessions whose frames it sends over a stream.
     pub streams: f64,
-    /// Draws what it does.
     pub chance: Chance,
-    /// What goes wrong.
     pub rates: Rates,
-    /// What happens.
     pub trace: Trace,
-    /// What contradicts the promises.
     pub journal: Journal,
     /// Whether faults have ended.
     pub is_quiet: Arc<AtomicBool>,
@@ -68,7 +62,6 @@ pub(crate) enum Ended {
 }
 
 impl Caller {
-    /// Makes the client of a caller.
     pub fn client(
         wire: Wire,
         http: reqwest::Client,
@@ -345,7 +338,6 @@ impl Caller {
 }
 
 impl Account {
-    /// What is sent next.
     fn next(&self) -> Sent {
         sent(self.sent.len() + self.unanswered.len())
     }

@@ -11,12 +11,10 @@ use std::time::Duration;
 pub struct Chance(Arc<Mutex<ChaCha8Rng>>);
 
 impl Chance {
-    /// The choices of this seed.
     pub fn new(seed: u64) -> Self {
         Self(Arc::new(Mutex::new(ChaCha8Rng::seed_from_u64(seed))))
     }
 
-    /// Whether something happens that has this probability.
     pub fn happens(&self, probability: f64) -> bool {
         // Without a draw where it is certain, so that a fault that is off changes nothing else.
         probability > 0.0 && self.draw(|rng| rng.random_bool(probability))
@@ -27,7 +25,6 @@ impl Chance {
         self.draw(|rng| rng.random_range(range))
     }
 
-    /// So many milliseconds.
     pub fn millis(&self, range: impl SampleRange<u64>) -> Duration {
         Duration::from_millis(self.between(range))
     }
@@ -37,7 +34,6 @@ impl Chance {
         &among[self.between(0..among.len())]
     }
 
-    /// A number of any value.
     pub fn number(&self) -> u128 {
         self.draw(|rng| rng.random())
     }

@@ -5,7 +5,6 @@ use bagtrack_sessions::clock::sleep;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// How many replicas there are.
 pub const REPLICAS: usize = 3;
 
 /// The replicas. Clones are the same.
@@ -25,7 +24,6 @@ struct Place {
 }
 
 impl Cluster {
-    /// Starts all of them.
     pub async fn start(setup: Setup) -> Self {
         let places = (0..REPLICAS).map(|_| Place::default()).collect();
         let cluster = Self {
@@ -38,7 +36,6 @@ impl Cluster {
         cluster
     }
 
-    /// What all replicas have.
     pub fn setup(&self) -> &Setup {
         &self.setup
     }
@@ -85,7 +82,6 @@ impl Cluster {
             .collect()
     }
 
-    /// Kills one at once.
     pub fn kill(&self, index: usize) {
         if let Some(replica) = self.at(index) {
             self.setup

@@ -19,9 +19,7 @@ pub struct Rates {
     pub store_doubled: f64,
     /// A request does not come to a replica.
     pub request_lost: f64,
-    /// The answer to a request is lost.
     pub answer_lost: f64,
-    /// A request comes twice.
     pub request_doubled: f64,
     /// A request or an answer takes long.
     pub request_late: f64,
@@ -36,9 +34,7 @@ pub struct Events {
     pub kill: u32,
     /// A replica is asked to end, and does some time later.
     pub drain: u32,
-    /// The store is away.
     pub store_away: u32,
-    /// The store is slow.
     pub store_slow: u32,
     /// The store is restarted, with its keys.
     pub store_restart: u32,
@@ -47,7 +43,6 @@ pub struct Events {
 }
 
 impl Rates {
-    /// Those of a run.
     pub fn draw(chance: &Chance) -> Self {
         let rate = |most: f64| match chance.happens(0.5) {
             true => chance.between(0.0..most),
@@ -67,7 +62,6 @@ impl Rates {
         }
     }
 
-    /// Whether something happens that has this rate.
     pub fn happens(&self, chance: &Chance, rate: f64) -> bool {
         self.is_on.load(Ordering::Relaxed) && chance.happens(rate)
     }
@@ -79,7 +73,6 @@ impl Rates {
 }
 
 impl Events {
-    /// Those of a run.
     pub fn draw(chance: &Chance) -> Self {
         let weight = || {
             if chance.happens(0.5) {

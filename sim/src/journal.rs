@@ -23,9 +23,7 @@ struct Pages {
 /// An answer to a frame, as a replica gave it.
 #[derive(Debug)]
 pub struct Given {
-    /// The session's id.
     pub session: String,
-    /// The frame's number.
     pub frame: u64,
     /// A digest of what was sent.
     pub sent: u64,
@@ -76,7 +74,6 @@ impl Journal {
         self.lock().faults.push(fault);
     }
 
-    /// What contradicts the promises.
     pub fn faults(&self) -> Vec<String> {
         self.lock().faults.clone()
     }

@@ -39,7 +39,6 @@ impl Life {
         self.lock().polls_left = Some(polls);
     }
 
-    /// Whether it has ended.
     pub fn is_dead(&self) -> bool {
         self.lock().is_dead
     }
@@ -50,7 +49,6 @@ impl Life {
         state.is_dead || state.polls_left.is_some()
     }
 
-    /// A task of the replica.
     pub fn run<T>(&self, task: impl Future<Output = T> + Send + 'static) -> Mortal<T> {
         Mortal {
             life: self.clone(),
@@ -109,7 +107,6 @@ pub struct MortalStream {
 }
 
 impl MortalStream {
-    /// Over this line.
     pub fn new(life: Life, line: DuplexStream) -> Self {
         Self { life, line }
     }

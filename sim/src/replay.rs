@@ -12,7 +12,6 @@ use std::collections::HashMap;
 pub struct Opening {
     /// Which pictures it is sent.
     pub clip: usize,
-    /// The seed of the tracker.
     pub seed: u64,
 }
 
@@ -36,7 +35,6 @@ const PARAMETERS: [(&str, u32); 7] = [
     ("update_every", 2),
 ];
 
-/// The options that open a session.
 pub fn options(opening: Opening) -> OpenOptions {
     let options = OpenOptions::new()
         .preset(bagtrack_client::Preset::Paper)

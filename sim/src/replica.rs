@@ -40,13 +40,9 @@ pub struct Setup {
     pub store: Option<Server>,
     /// The state is written at every so many frames.
     pub store_every: u64,
-    /// Workers of each.
     pub workers: usize,
-    /// What goes wrong.
     pub rates: Rates,
-    /// Draws it.
     pub chance: Chance,
-    /// What happens.
     pub trace: Trace,
 }
 
@@ -55,9 +51,7 @@ pub struct Setup {
 pub struct Replica {
     /// Which one, and which life of it.
     pub name: String,
-    /// Its life.
     pub life: Life,
-    /// The service.
     pub service: Service,
     /// What its sessions expire by.
     pub clock: Clock,
@@ -108,7 +102,6 @@ fn config(setup: &Setup) -> Config {
 }
 
 impl Replica {
-    /// Starts one.
     pub async fn start(setup: &Setup, name: String) -> Self {
         let (life, clock) = (Life::default(), Clock::with_wall(time_of_day));
         let store = match &setup.store {

@@ -6,9 +6,7 @@ use image::{DynamicImage, GrayImage, ImageFormat, Luma};
 use std::io::Cursor;
 use std::sync::OnceLock;
 
-/// How many clips there are.
 pub const CLIPS: usize = 4;
-/// How many pictures a clip has.
 pub const PICTURES: usize = 24;
 const WIDTH: u32 = 64;
 const HEIGHT: u32 = 48;
@@ -24,7 +22,6 @@ pub fn picture(clip: usize, index: usize) -> Bytes {
     clips[clip][index % PICTURES].clone()
 }
 
-/// Where the target is in a picture.
 pub fn target(clip: usize, index: usize) -> Rect {
     let (x, y) = corner(clip, index % PICTURES);
     Rect {

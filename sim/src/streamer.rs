@@ -284,7 +284,6 @@ impl Account {
     }
 }
 
-/// The next message of the service.
 async fn message(socket: &mut Socket, patience: Duration) -> Result<Value, Left> {
     loop {
         match timeout(patience, socket.next()).await {

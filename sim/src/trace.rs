@@ -21,14 +21,12 @@ impl Trace {
         }
     }
 
-    /// Adds a line.
     pub fn note(&self, line: fmt::Arguments) {
         let at = self.begin.elapsed().as_millis();
         let mut lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
         writeln!(lines, "{at:>8} ms  {line}").expect("memory takes it");
     }
 
-    /// All lines.
     pub fn bytes(&self) -> Vec<u8> {
         let lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
         lines.clone()

@@ -10,7 +10,6 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-/// The name of the command.
 pub const NAME: &str = "confined";
 /// The exit status where the program cannot be started, as shells have it.
 const NOT_STARTED: u8 = 127;

@@ -53,7 +53,6 @@ impl Args {
     }
 }
 
-/// Runs `health`.
 pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
     let (scheme, address, host) = match &args.url {
         None => {

@@ -77,7 +77,6 @@ pub fn parse() -> Cli {
     Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 
-/// Runs the command.
 pub fn run(cli: Cli) -> ExitCode {
     let done = |()| ExitCode::SUCCESS;
     let result = match cli.command.unwrap_or(Command::Serve(Box::new(cli.serve))) {

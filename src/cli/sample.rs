@@ -99,7 +99,6 @@ enum SceneFlag {
     Leaves,
 }
 
-/// Runs `sample`.
 pub fn run(args: Args) -> Result<(), Box<dyn std::error::Error>> {
     let format = match args.format {
         FormatFlag::Jpeg => Format::Jpeg,

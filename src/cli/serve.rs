@@ -37,7 +37,6 @@ pub struct Args {
     log_format: LogFormat,
 }
 
-/// Runs `serve`.
 pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
     let log = Log::start(&args.log, args.log_format)?;
     variables::check(&super::command());

@@ -60,7 +60,6 @@ pub struct Reloaded {
 }
 
 impl Reloaded {
-    /// Of this service.
     pub fn of(application: &Application) -> Self {
         Self {
             keys: application.api_keys(),

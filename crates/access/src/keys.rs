@@ -156,7 +156,6 @@ pub(super) fn read_regular(path: &Path) -> io::Result<String> {
     }
 }
 
-/// Refuses a key that two owners have.
 fn check_owners(keys: &[ApiKey]) -> Result<(), KeysError> {
     let mut owners = HashMap::new();
     for key in keys {

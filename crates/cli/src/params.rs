@@ -73,7 +73,6 @@ fn parameter_list() -> String {
         })
 }
 
-/// The values that a parameter may have.
 fn allowed(parameter: &Parameter) -> String {
     match parameter.range {
         Some((min, max)) => format!("{min} to {max}"),

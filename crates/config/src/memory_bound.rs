@@ -95,7 +95,6 @@ impl MemoryBound {
     }
 }
 
-/// What one connection takes.
 fn connection(config: &Config) -> u64 {
     let plain = 2 * MAX_BUFFER_BYTES as u64 + CONNECTION;
     #[cfg(feature = "tls")]

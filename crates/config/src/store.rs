@@ -30,7 +30,6 @@ settings! {
 }
 
 impl StoreConfig {
-    /// Whether the store is in a folder.
     pub(super) fn is_in_folder(&self) -> bool {
         matches!(self.address(), Some(StoreAddress::File(_)))
     }
@@ -44,7 +43,6 @@ impl StoreConfig {
         self.store.is_none() && of(self) != of(&Self::default())
     }
 
-    /// Checks the address.
     pub(super) fn check_address(&self) -> Result<(), ConfigError> {
         let held = in_range(
             self.store.is_none() || self.address().is_some(),
@@ -54,7 +52,6 @@ impl StoreConfig {
         ConfigError::check("store", held)
     }
 
-    /// The address, where there is a valid one.
     fn address(&self) -> Option<StoreAddress> {
         let text = self.store.as_ref().map(Secret::text)?;
         StoreAddress::parse(text, self.store_timeout).ok()

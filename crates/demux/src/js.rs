@@ -82,7 +82,6 @@ impl JsIndex {
     }
 }
 
-/// A file of the browser.
 struct File {
     read: Function,
     size: u64,

@@ -44,7 +44,6 @@ impl Figures {
         }
     }
 
-    /// The means over the runs of one sequence.
     fn over_seeds(sequence: &SequenceRuns) -> Self {
         let runs: Vec<Self> = sequence.seeds.iter().map(Self::of_run).collect();
         Self {

@@ -120,7 +120,6 @@ impl Activity {
     }
 }
 
-/// A body that notes its end.
 struct WatchedBody {
     body: Body,
     activity: Arc<Activity>,

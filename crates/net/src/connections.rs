@@ -159,7 +159,6 @@ impl Open {
         self.counts.get(holder).copied().unwrap_or(0)
     }
 
-    /// How many are idle.
     fn idle(&self) -> usize {
         let activities = self.connections.values();
         let idle = activities.filter(|(_, activity)| activity.idle_since().is_some());

@@ -28,7 +28,6 @@ pub type MessageRate = DefaultDirectRateLimiter;
 
 /// Most bytes of a fragment. Masks have four bytes, so each fragment begins with the first of them.
 const FRAGMENT: usize = 16 << 10;
-/// Most bytes that are read at once.
 const READ_BYTES: usize = 32 << 10;
 /// A message that grows may be there twice: in the room that it had, and in the one that it gets.
 const COPIES: usize = 2;

@@ -133,7 +133,6 @@ impl Account {
         self.held.is_empty() && !owes
     }
 
-    /// Who counts frames.
     fn counting_frames(&self) -> &Self {
         self.key.as_deref().unwrap_or(self)
     }

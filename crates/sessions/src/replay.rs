@@ -36,17 +36,14 @@ pub(super) struct Answered {
 pub(super) struct TargetAnswer {
     /// The box that the client gave with the frame: set for the first frame and for corrections.
     pub(super) given: Option<Rect>,
-    /// The answer.
     pub(super) estimate: Estimate,
 }
 
 impl Answered {
-    /// The answer.
     pub(super) fn estimates(&self) -> Estimates {
         self.targets.map(|target| target.estimate)
     }
 
-    /// The frame's number.
     pub(super) fn frame(&self) -> u64 {
         self.targets.first().estimate.frame
     }

@@ -116,12 +116,10 @@ impl Targets {
         (all.iter().all(same) && fits).then_some(targets)
     }
 
-    /// The trackers.
     pub(super) fn trackers(&self) -> &PerTarget<Tracker> {
         &self.0
     }
 
-    /// The last answer.
     pub(super) fn estimates(&self) -> Estimates {
         self.0.map(Tracker::estimate)
     }

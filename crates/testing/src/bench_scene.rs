@@ -2,9 +2,7 @@
 
 use bagtrack_tracker::{Frame, Rect};
 
-/// Width of a frame.
 pub const WIDTH: usize = 320;
-/// Height of a frame.
 pub const HEIGHT: usize = 240;
 /// Frames until the target is where it began.
 pub const ROUND: usize = 64;
@@ -51,12 +49,10 @@ pub fn wall(width: usize, height: usize) -> Vec<u8> {
         .collect()
 }
 
-/// Frame `t`.
 pub fn frame(t: usize) -> Frame {
     Frame::from_luma(WIDTH as u32, HEIGHT as u32, luma(t, 1)).expect("a frame of this size")
 }
 
-/// All frames of a round.
 pub fn frames() -> Vec<Frame> {
     (0..ROUND).map(frame).collect()
 }

@@ -97,7 +97,6 @@ impl IssuerKey {
         }
     }
 
-    /// A token with these claims.
     pub fn sign(&self, claims: &Value) -> String {
         let name = match &self.pair {
             Pair::Ecdsa(_, name, _) | Pair::Rsa(name, _) => name,
@@ -148,7 +147,6 @@ pub fn unsigned(header: &Value, claims: &Value) -> String {
     format!("{}.{}", encode(header), encode(claims))
 }
 
-/// The key set of an issuer with these keys.
 pub fn key_set(keys: &[&IssuerKey]) -> String {
     let keys: Vec<Value> = keys.iter().map(|key| key.public()).collect();
     json!({ "keys": keys }).to_string()

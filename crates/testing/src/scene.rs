@@ -204,7 +204,6 @@ pub fn tilting(t: usize, zoom: usize) -> (Frame, Rect) {
     (frame.expect("a frame of this size"), target)
 }
 
-/// A frame of one gray value.
 pub fn flat(width: u32, height: u32, value: u8) -> Frame {
     let pixels = vec![value; width as usize * height as usize];
     Frame::from_luma(width, height, pixels).expect("a frame of this size")

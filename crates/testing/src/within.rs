@@ -6,9 +6,6 @@ use std::time::Duration;
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The output of a future that ends soon: that of `what`.
-///
-/// # Panics
-/// It does not.
 pub async fn within<T>(future: impl Future<Output = T>, what: &str) -> T {
     let output = tokio::time::timeout(PATIENCE, future).await;
     output.unwrap_or_else(|_| panic!("not within a minute: {what}"))

@@ -8,13 +8,9 @@ type Bytes = Vec<u8>;
 /// What a command answers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Reply {
-    /// Nothing.
     Nil,
-    /// A number.
     Integer(i64),
-    /// A text.
     Bulk(Bytes),
-    /// Several.
     List(Vec<Reply>),
 }
 
@@ -91,7 +87,6 @@ impl Keyspace {
         self.expire(key, ttl).map(|_| ())
     }
 
-    /// The text of a field of a hash.
     pub fn field(&mut self, key: &[u8], field: &str) -> Option<Bytes> {
         match self.fields(key, &[field.as_bytes().to_vec()]).ok()?.pop()? {
             Reply::Bulk(text) => Some(text),

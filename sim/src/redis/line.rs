@@ -20,11 +20,8 @@ pub struct Line {
     pub server: Server,
     /// The replica. Of one that is dead nothing comes.
     pub life: Life,
-    /// What goes wrong.
     pub rates: Rates,
-    /// Draws it.
     pub chance: Chance,
-    /// What happened.
     pub trace: Trace,
 }
 

@@ -70,7 +70,6 @@ impl Engine {
     }
 }
 
-/// A word of a command.
 fn word(value: &Value) -> mlua::Result<Vec<u8>> {
     match value {
         Value::String(text) => Ok(text.as_bytes().to_vec()),

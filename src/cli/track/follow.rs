@@ -15,11 +15,9 @@ use std::sync::Arc;
 
 /// What there is to do.
 pub struct Job {
-    /// The frames.
     pub frames: Frames,
     /// The targets in the first frame that is wanted.
     pub boxes: Vec<Rect>,
-    /// The parameters of all trackers.
     pub params: Params,
     /// What gives a second opinion, where it is wanted.
     pub expert: Option<Arc<dyn Expert>>,
@@ -29,7 +27,6 @@ pub struct Job {
     pub count: Option<u64>,
     /// Which boxes are written.
     pub selection: Selection<Row>,
-    /// Where boxes go.
     pub rows: Rows,
     /// What the video or folder is called.
     pub name: String,

@@ -12,7 +12,6 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::vec::IntoIter;
 
-/// A frame.
 pub struct FrameFile {
     /// Its number in the folder or the video, from 0.
     pub index: u64,
@@ -22,16 +21,13 @@ pub struct FrameFile {
     pub shown: String,
     /// The name of its file, where it has one.
     pub file: Option<String>,
-    /// Its bytes.
     pub bytes: Vec<u8>,
 }
 
 /// Which way frames are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
-    /// To the last frame.
     Forwards,
-    /// To the first frame.
     Backwards,
 }
 
@@ -151,7 +147,6 @@ impl Frames {
         })
     }
 
-    /// Frames a second.
     pub fn rate(&self) -> Rate {
         match &self.source {
             Source::Folder(..) => Rate::default(),
@@ -159,7 +154,6 @@ impl Frames {
         }
     }
 
-    /// Whether frames have times.
     pub fn have_times(&self) -> bool {
         matches!(self.source, Source::Video(..))
     }

@@ -30,7 +30,6 @@ impl Interrupt {
         Ok(Self(came))
     }
 
-    /// Whether a signal came.
     pub fn came(&self) -> bool {
         self.0.load(Ordering::Relaxed) != 0
     }

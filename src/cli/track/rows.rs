@@ -61,7 +61,6 @@ impl Rows {
         self.is_on_terminal
     }
 
-    /// Takes these rows.
     pub fn write(&mut self, new: Vec<Row>) -> io::Result<()> {
         match &mut self.sink {
             Sink::Document(_, _, rows) | Sink::Yolo(_, rows) => {

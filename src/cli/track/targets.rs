@@ -6,7 +6,6 @@ use bagtrack_tracker::{Estimate, Expert, Frame, Params, Rect, Tracker, TrackerEr
 use std::error::Error;
 use std::sync::Arc;
 
-/// A tracker for each target.
 pub struct Targets {
     trackers: Vec<Tracker>,
     frame_size: (u32, u32),

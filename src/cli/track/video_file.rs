@@ -45,7 +45,6 @@ pub fn endings() -> String {
     ENDINGS.map(|ending| format!(".{ending}")).join(", ")
 }
 
-/// Whether this is the name of a video.
 pub fn is_video(path: &Path) -> bool {
     ENDINGS.contains(&ending(path).as_str())
 }

@@ -73,7 +73,6 @@ impl Rate {
         (self.numerator, self.denominator)
     }
 
-    /// As a number.
     pub fn value(self) -> f64 {
         f64::from(self.numerator) / f64::from(self.denominator)
     }

@@ -64,7 +64,6 @@ impl<'a> Buffer<'a> {
         self.bytes.len()
     }
 
-    /// All bytes.
     pub(super) fn finish(self) -> Bytes {
         self.bytes.into()
     }

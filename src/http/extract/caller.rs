@@ -28,7 +28,6 @@ impl Caller {
         }
     }
 
-    /// Whoever has a session token for this session.
     pub fn with_token(session: SessionName, credential: Credential) -> Self {
         Self {
             credential,
@@ -36,7 +35,6 @@ impl Caller {
         }
     }
 
-    /// What the request came with.
     pub fn credential(&self) -> &Credential {
         &self.credential
     }

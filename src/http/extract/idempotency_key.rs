@@ -3,7 +3,6 @@
 use crate::http::problems::problem::Problem;
 use axum::http::HeaderMap;
 
-/// The header.
 pub const IDEMPOTENCY_KEY: &str = "idempotency-key";
 const MAX_KEY_BYTES: usize = 255;
 

@@ -14,7 +14,6 @@ use bagtrack_api::ProblemKind as Kind;
 use std::convert::Infallible;
 use tower_http::request_id::RequestId;
 
-/// The header of request ids.
 pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 const MAX_ID_BYTES: usize = 64;
 
@@ -27,12 +26,10 @@ pub struct ClientPath(pub String);
 pub struct Instance {
     /// The path, as the client knows it.
     pub path: String,
-    /// The id.
     pub request_id: String,
 }
 
 impl Instance {
-    /// Of this request.
     pub fn of(request: &Request) -> Self {
         Self::from_head(request.extensions(), request.uri())
     }

@@ -77,7 +77,6 @@ pub(super) fn parameter<S: Settings>(name: &str, text: &str) -> Option<Problem> 
     Some(Problem::malformed(detail))
 }
 
-/// A name as it is told.
 fn shown(name: &str) -> String {
     name.chars().take(64).collect()
 }

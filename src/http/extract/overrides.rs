@@ -10,7 +10,6 @@ use bagtrack_tracker::{Params, Rect};
 /// The longest list of boxes is as long as a session has targets.
 const _: () = assert!(api::MAX_TARGETS == bagtrack_sessions::MAX_TARGETS);
 
-/// A box as the tracker has it.
 pub fn rect(target: api::Rect) -> Rect {
     Rect::new(target.x, target.y, target.width, target.height)
 }

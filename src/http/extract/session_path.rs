@@ -50,7 +50,6 @@ impl SessionPath {
         Ok(session)
     }
 
-    /// Ends the session.
     pub async fn end(&self, state: &AppState) -> Result<(), Problem> {
         self.find(state).await?;
         let (owner, flow) = (self.caller.owner(), state.flow(&self.client));

@@ -10,7 +10,6 @@ use serde_json::{Map, Value};
 
 /// Most bytes of a setting. All parameters of the tracker together take some hundred.
 pub(super) const MAX_TEXT_BYTES: usize = 16 << 10;
-/// Most bytes of the name of a setting.
 const MAX_NAME_BYTES: usize = 64;
 /// Most settings of a request; no route has nearly as many.
 const MAX_SETTINGS: usize = 32;
@@ -87,10 +86,7 @@ impl Texts {
 /// The files of a body, and the texts of its settings.
 #[derive(Debug, Default)]
 pub(super) struct Fields {
-    /// The files, in order.
     pub(super) files: Vec<Bytes>,
-    /// The snapshot beside the files.
     pub(super) snapshot: Option<Bytes>,
-    /// The texts.
     pub(super) texts: Texts,
 }

@@ -109,12 +109,10 @@ impl<S: Settings> Upload<S> {
     }
 }
 
-/// A body that has arrived.
 struct Arrived {
     fields: Fields,
     /// Its text, where it is JSON, which is still to be parsed.
     json: Option<Bytes>,
-    /// Pays for all of it.
     charge: Charge,
 }
 

@@ -18,7 +18,6 @@ const REQUESTS: &str = "bagtrack_http_requests_total";
 const REQUEST_TIME: &str = "bagtrack_http_request_duration_seconds";
 const PROBLEMS: &str = "bagtrack_problems_total";
 
-/// All metrics of a service.
 pub struct Metrics {
     recorder: PrometheusRecorder,
     /// Time from the place in the queue to the worker.
@@ -29,7 +28,6 @@ pub struct Metrics {
     pub sent_bytes: Counter,
     /// Idle connections that were closed for others.
     pub shed_connections: Counter,
-    /// What decoding and tracking measure.
     pub tracking: TrackingMetrics,
 }
 
@@ -72,7 +70,6 @@ impl Metrics {
         }
     }
 
-    /// A request was answered.
     pub fn answered(&self, method: &str, route: &str, status: u16, seconds: f64) {
         let make = Maker(&self.recorder);
         let route = Label::new("route", route.to_owned());
@@ -87,7 +84,6 @@ impl Metrics {
         times.record(seconds);
     }
 
-    /// A request met a problem.
     pub fn problem(&self, kind: Kind) {
         let labels = vec![Label::from_static_parts("kind", kind.slug())];
         Maker(&self.recorder)
@@ -173,14 +169,12 @@ impl Maker<'_> {
         self.find_counter(name, labels.to_vec())
     }
 
-    /// A histogram of seconds.
     fn seconds(&self, name: &'static str, text: &'static str) -> Histogram {
         self.describe_seconds(name, text);
         self.0
             .register_histogram(&Key::from_static_name(name), &METADATA)
     }
 
-    /// A value of a moment.
     fn gauge(&self, name: &'static str, text: &'static str) -> Gauge {
         let described = KeyName::from_const_str(name);
         self.0.describe_gauge(described, None, text.into());
@@ -194,7 +188,6 @@ impl Maker<'_> {
             .register_counter(&Key::from_parts(name, labels), &METADATA)
     }
 
-    /// Says what a counter counts.
     fn describe_counter(&self, name: &'static str, text: &'static str) {
         let described = KeyName::from_const_str(name);
         self.0.describe_counter(described, None, text.into());

@@ -13,7 +13,6 @@ use axum::response::{IntoResponse, Response};
 use bagtrack_api::media_types::PROBLEM;
 use std::any::Any;
 
-/// The middleware.
 pub async fn answer_problems(
     State(state): State<AppState>,
     instance: Instance,

@@ -26,7 +26,6 @@ struct ClientAddress {
     is_proxy: bool,
 }
 
-/// Notes the address of the client that a request is from.
 pub fn note_address(state: &AppState, request: &mut Request) -> IpAddr {
     let peer = request.extensions().get::<Peer>();
     let peer = peer.map_or(Ipv4Addr::UNSPECIFIED.into(), |Peer(peer)| peer.ip());

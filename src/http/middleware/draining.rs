@@ -7,10 +7,8 @@ use axum::http::{HeaderName, HeaderValue};
 use axum::middleware::Next;
 use axum::response::Response;
 
-/// The header.
 pub const DRAINING: HeaderName = HeaderName::from_static(bagtrack_api::headers::DRAINING);
 
-/// The middleware.
 pub async fn mark_draining(
     State(state): State<AppState>,
     request: Request,

@@ -37,7 +37,6 @@ pub fn join(span: &Span, request: &Request, context: TraceContext) -> TraceConte
     }
 }
 
-/// Notes the status of the answer.
 pub fn answered(span: &Span, status: u16) {
     span.set_attribute("http.response.status_code", i64::from(status));
 }

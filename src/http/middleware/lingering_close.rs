@@ -16,7 +16,6 @@ use std::pin::Pin;
 use std::task::{Context, Poll};
 use tokio::sync::oneshot;
 
-/// The middleware.
 pub async fn drain_refused(
     State(state): State<AppState>,
     request: Request,

@@ -20,13 +20,11 @@ use tracing::field::Empty;
 use tracing::{Instrument, Level, Span};
 use uuid::Uuid;
 
-/// Bytes of a path that are logged.
 const MAX_LOGGED_PATH: usize = 200;
 /// Characters of a session's id that are logged.
 const SHOWN_OF_ID: usize = 8;
 const PROBES: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
 
-/// The middleware.
 pub async fn log_request(
     State(state): State<AppState>,
     mut request: Request,
@@ -70,7 +68,6 @@ fn span(request: &Request, is_probe: bool, client: IpAddr) -> Span {
     }
 }
 
-/// The path as it is logged.
 fn logged(path: &str) -> String {
     let path = &path[..path.floor_char_boundary(MAX_LOGGED_PATH)];
     let mut before = "";

@@ -6,13 +6,11 @@
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use bagtrack_sessions::random::random_range;
 
-/// The header.
 pub const TRACEPARENT: HeaderName = HeaderName::from_static("traceparent");
 
 /// The trace of a request, and its span in that trace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TraceContext {
-    /// The trace.
     pub trace: u128,
     /// The span of the client, if it named one.
     pub parent: Option<u64>,
@@ -51,7 +49,6 @@ impl TraceContext {
         format!("{:032x}", self.trace)
     }
 
-    /// The header.
     pub fn header(&self) -> HeaderValue {
         let Self {
             trace, span, flags, ..

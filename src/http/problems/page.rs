@@ -25,7 +25,6 @@ nav ul { columns: 20rem; padding-left: 1rem; }
 in the log. Bad input changes no session. All calls are at <a href="./">/docs</a>.</p>
 "#;
 
-/// The page, made from the catalogue.
 pub fn page() -> String {
     let mut page = HEAD.to_owned();
     page.push_str("<nav><ul>\n");

@@ -23,7 +23,6 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// A problem of this kind.
     pub fn new(kind: Kind, detail: impl Into<String>) -> Self {
         Self {
             kind,
@@ -52,7 +51,6 @@ impl Problem {
         Self::malformed(detail)
     }
 
-    /// No route has this path.
     pub fn no_route(path: &str) -> Self {
         match path.trim_end_matches('/') {
             "" => Self::route_not_found(),
@@ -87,7 +85,6 @@ impl Problem {
         Self::new(Kind::NotReady, detail)
     }
 
-    /// The service failed.
     pub fn internal(cause: Arc<dyn Error + Send + Sync>) -> Self {
         Self::panicked().caused_by(cause)
     }
@@ -118,7 +115,6 @@ impl Problem {
         Self::new(Kind::TooManyFrames, detail)
     }
 
-    /// Says more.
     pub fn and(mut self, more: &str) -> Self {
         self.detail = format!("{} {more}", self.detail);
         self
@@ -145,7 +141,6 @@ impl Problem {
         }
     }
 
-    /// Says which of `count` targets is meant.
     pub fn of_target(mut self, target: usize, count: usize) -> Self {
         self.detail = format!(
             "Target {target} of {count}, counted from 0: {}",
@@ -180,7 +175,6 @@ impl Problem {
             .or_else(|| self.kind.retry_after())
     }
 
-    /// Its kind.
     pub fn kind(&self) -> Kind {
         self.kind
     }
@@ -234,64 +228,44 @@ macro_rules! fixed {
 }
 
 fixed! {
-    /// No frame came.
     missing_frame: MissingFrame
         "Send the image as the body, as the multipart part `frame`, or as base64 in the JSON field `frame`.";
-    /// No box came.
     missing_box: MissingBox
         "Send the target's box in the pixels of the frame: `box=x,y,width,height` in the query or as a field; for \
             several targets `boxes=x,y,width,height;x,y,width,height`.";
-    /// No box came with a correction.
     missing_corrected_box: MissingBox
         "Send where the target is in this frame, in its pixels: `box=x,y,width,height` in the query or as a field. Where \
             the session has several targets, `target=N` says which one.";
-    /// No route has this path.
     route_not_found: RouteNotFound "See /docs for the paths there are.";
-    /// The request has no key, or none that is valid.
     unauthorized: Unauthorized "Send an API key, or a session token that has not ended: `Authorization: Bearer …`.";
-    /// The request needs an API key, and came with a session token.
     forbidden: Forbidden "Use an API key: a session token is good for what is below its own session only.";
-    /// A browser sent the request for a page of another origin.
     origin_not_allowed: OriginNotAllowed
         "Start the service with the origin of the page in --cors-origins (BAGTRACK_CORS_ORIGINS).";
-    /// The request names another host.
     host_not_allowed: HostNotAllowed "Start the service with this host in --allowed-hosts (BAGTRACK_ALLOWED_HOSTS).";
-    /// No live session of the client has this id.
     session_not_found: SessionNotFound
         "No session of yours has this id here: it was never opened with this key, was deleted, or the service was \
             started again without a store. Open a new one with POST /sessions.";
-    /// The session was not used for too long.
     session_expired: SessionExpired
         "No frame came in time; `expires_at` tells how long a session waits. Open a new one with POST /sessions.";
-    /// The idempotency key came with another request before.
     idempotency_key_reused: IdempotencyKeyReused
         "Send the same frame and settings as the first time, or a new `Idempotency-Key`.";
-    /// A live session that another request opened has the id.
     session_exists: SessionExists
         "A live session has this id, and another frame, other settings or another key opened it. Make a new id.";
-    /// The frame has no number, and came while another request was at the session.
     not_in_order: NotInOrder
         "Another request with frames was at this session. Number the frames (`?frame=N`), or wait for each answer. \
             This one was not tracked.";
-    /// The work took too long.
     work_timeout: WorkTimeout
         "Try again after the time in `Retry-After`. A frame sent with its number (`?frame=N`) is never tracked \
             twice.";
-    /// The store has no record of a session whose time is not over.
     session_lost: SessionNotFound
         "The store has lost this session. Open a new one with POST /sessions, from your last snapshot, or from a \
             frame and a box.";
-    /// The service is about to end.
     not_ready: NotReady "The service is about to end. Open sessions at another instance.";
-    /// The service failed, and the log already has the cause.
     panicked: Internal "The fault is the service's. The log has the cause under this request id.";
-    /// The address has as many connections as it may, and all of them are busy.
     too_many_connections: QuotaExceeded
         "This address has as many connections as one may, all of them busy. Use them again, or try again after the \
             time in `Retry-After`.";
-    /// The route has other methods.
     method_not_allowed: MethodNotAllowed "The header `Allow` lists the methods there are.";
-    /// The body did not arrive in time.
     body_timeout: BodyTimeout "Send the whole body faster, or a smaller frame. The session is unchanged.";
 }
 

@@ -25,7 +25,6 @@ use bagtrack_sessions::{
 };
 use std::vec::IntoIter;
 
-/// A request with the next frames.
 pub type FramesRequest = SessionRequest<FramesSettings>;
 
 impl FramesRequest {
@@ -105,7 +104,6 @@ async fn respond_to(
 enum FrameSource {
     /// Files of the request, and when the last has to be tracked.
     Files(IntoIter<Bytes>, Instant),
-    /// A video.
     Video(VideoFrames),
 }
 

@@ -11,7 +11,6 @@ use axum::response::IntoResponse;
 use bagtrack_sessions::clock;
 use std::sync::Arc;
 
-/// The text format of Prometheus.
 const MEDIA_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
 
 /// Metrics for Prometheus

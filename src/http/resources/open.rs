@@ -92,15 +92,11 @@ pub async fn put(state: State<AppState>, request: CreateRequest) -> Result<Respo
 /// A request to open a session, with its place in the queue.
 #[derive(Debug)]
 pub struct CreateRequest {
-    /// Who opens it.
     pub caller: Caller,
     /// What the client calls the session, where it gives it a name.
     pub key: Option<CreationKey>,
-    /// What the client has in use.
     pub account: Arc<Account>,
-    /// The place in the queue.
     pub queue: QueuePermit,
-    /// The frame and the settings.
     pub upload: Upload<CreateSettings>,
 }
 

@@ -69,12 +69,10 @@ pub fn sessions() -> OpenApiRouter<AppState> {
         .routes(routes!(handshake::open))
 }
 
-/// `/metrics`.
 pub fn metrics() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(metrics::get))
 }
 
-/// `/version`.
 pub fn version() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(version::get))
 }

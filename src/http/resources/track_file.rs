@@ -119,7 +119,6 @@ impl TrackFile {
         Ok(charged_body(media_type, text, charge).into_response())
     }
 
-    /// The targets in a frame, and their rows.
     fn rows(&self, frame: &TrackedFrame) -> Vec<(bagtrack_tracker::Estimate, Row)> {
         let estimates = frame.estimates.as_slice().iter().enumerate();
         let rows = estimates.map(|(target, estimate)| {
@@ -184,7 +183,6 @@ fn media_type(format: FileFormat) -> &'static str {
     }
 }
 
-/// What each target is called.
 fn names(settings: &TrackSettings, targets: usize) -> Result<Vec<String>, Problem> {
     let given = settings.names.iter().flat_map(|names| &names.0);
     let mut names: Vec<String> = given.map(|name| name.0.clone()).collect();

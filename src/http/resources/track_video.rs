@@ -18,15 +18,11 @@ use std::sync::Arc;
 /// A video that is tracked.
 #[derive(Debug)]
 pub struct VideoTrack {
-    /// The service.
     pub state: AppState,
-    /// The place in the queue.
     pub queue: QueuePermit,
-    /// Who sends it.
     pub client: Client,
     /// The pictures, in the order in which they are tracked.
     pub frames: RangeFrames,
-    /// How far it is tracked.
     pub track: Track,
 }
 
@@ -50,7 +46,6 @@ pub struct TrackedFrame {
     pub time: f64,
     /// Its width and height in pixels.
     pub size: (u32, u32),
-    /// Where the targets are.
     pub estimates: Estimates,
     /// What may be wrong with the boxes that were given.
     pub warnings: Option<Vec<String>>,
@@ -103,9 +98,7 @@ impl VideoTrack {
 /// The answers to the frames of a video, as they are tracked.
 #[derive(Debug)]
 pub struct VideoAnswers {
-    /// The video.
     pub video: VideoTrack,
-    /// Which answers are given.
     pub selection: Selection<Arc<Answer>>,
     /// Why no further frame is tracked, once there is none.
     pub end: Option<End>,

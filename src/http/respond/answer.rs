@@ -15,7 +15,6 @@ pub const CHECKPOINT: HeaderName = HeaderName::from_static(headers::CHECKPOINT);
 
 /// Bytes of a target in an answer: the value, and its JSON with six numbers.
 const TARGET_BYTES: usize = 256;
-/// Most particles in an answer.
 const MAX_PARTICLES: usize = 200;
 
 /// A box as it is answered.

@@ -8,7 +8,6 @@ use bagtrack_sessions::{Charge, ChargedBytes};
 /// A body with its media type.
 pub type ChargedBody = ([(HeaderName, &'static str); 1], Bytes);
 
-/// A body of this media type.
 pub fn charged_body(
     media_type: &'static str,
     bytes: impl AsRef<[u8]> + Send + 'static,

@@ -21,7 +21,6 @@ use tracing::{Instrument, Span};
 
 /// Frames that are tracked one after the other.
 pub trait FrameSequence: Send + 'static {
-    /// The answer to a frame.
     type Answer: Serialize + Send;
 
     /// Tracks through the next frame; none after the last.

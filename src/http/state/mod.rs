@@ -35,9 +35,7 @@ pub struct Shared {
     pub uploads: Budget,
     /// What each client has in use.
     pub clients: Clients,
-    /// Keys and secrets.
     pub access: Access,
-    /// What is counted and measured.
     pub metrics: Metrics,
     /// The text of `/metrics` that was rendered last, and when that began.
     pub rendered_metrics: tokio::sync::Mutex<Option<(Instant, Bytes)>>,
@@ -109,7 +107,6 @@ impl AppState {
         self.service.is_draining()
     }
 
-    /// The time.
     pub fn now(&self) -> SystemTime {
         self.clock.wall(self.clock.now())
     }

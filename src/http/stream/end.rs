@@ -12,13 +12,10 @@ const REPLACED: u16 = OF_STATUS + 409;
 /// Why a stream ends.
 #[derive(Debug)]
 pub enum End {
-    /// The client closed it.
     Closed,
-    /// The client has gone.
     Gone,
     /// The client has not answered a ping.
     Silent,
-    /// The service ends.
     Shutdown,
     /// A newer stream of the session took its place.
     Replaced,

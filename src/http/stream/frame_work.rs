@@ -24,24 +24,18 @@ const STORE_RETRY: Duration = Duration::from_millis(250);
 /// What the frames of one stream have in common.
 #[derive(Debug)]
 pub struct FrameWork {
-    /// The service.
     pub state: AppState,
-    /// Who sends them.
     pub caller: Caller,
     /// The quotas that they are counted by.
     pub account: Arc<Account>,
-    /// The session.
     pub session: Uuid,
-    /// The stream's place.
     pub place: Arc<StreamPlace>,
-    /// The frames that wait.
     pub waiting: Mutex<Waiting>,
 }
 
 /// The answer to a frame.
 #[derive(Debug)]
 pub struct Given {
-    /// Where the targets are.
     pub estimates: Estimates,
     /// Whether it was given before.
     pub replayed: bool,
@@ -56,14 +50,12 @@ pub struct Given {
 /// What became of a frame.
 #[derive(Debug)]
 pub struct Done {
-    /// The answer, or the problem.
     pub answer: Result<Given, Problem>,
     /// Frames before it that were skipped.
     pub skipped: u64,
 }
 
 impl FrameWork {
-    /// The frames that wait.
     pub fn waiting(&self) -> MutexGuard<'_, Waiting> {
         // Nothing panics while it is held.
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)

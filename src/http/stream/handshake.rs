@@ -76,7 +76,6 @@ pub async fn open(
     Ok(request.upgrade.answer(limits, |socket| stream.run(socket)))
 }
 
-/// A request to open a stream.
 pub struct StreamRequest {
     instance: Instance,
     settings: StreamSettings,

@@ -5,7 +5,6 @@ use crate::http::problems::problem::Problem;
 use bagtrack_api::FrameHeader;
 use bagtrack_sessions::GivenBox;
 
-/// Most bytes of a text message.
 const MAX_TEXT_BYTES: usize = 4096;
 
 /// The correction, where there is one.

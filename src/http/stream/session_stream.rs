@@ -38,7 +38,6 @@ pub struct Stand {
     pub checkpoint: Option<u64>,
 }
 
-/// An open stream.
 pub struct SessionStream {
     /// What its frames have in common.
     pub work: Arc<FrameWork>,
@@ -46,7 +45,6 @@ pub struct SessionStream {
     pub connection: ConnectionHold,
     /// The place among the client's streams.
     pub permit: Charge,
-    /// Where the session stands.
     pub stand: Stand,
     /// What names the request that opened it, for problems.
     pub instance: Instance,

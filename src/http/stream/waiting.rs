@@ -86,7 +86,6 @@ impl Waiting {
         self.frames.front().is_some_and(|next| next.frame.is_err())
     }
 
-    /// The next one.
     pub fn take(&mut self) -> Option<Arrived> {
         self.frames.pop_front()
     }

@@ -10,7 +10,6 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;
 
-/// What `/metrics` says.
 pub async fn metrics(app: &TestApplication) -> String {
     let response = app.get("/metrics").await;
     let media_type = response.headers()["content-type"].to_str().unwrap();

@@ -22,12 +22,10 @@ async fn post_json(app: &TestApplication, method: Method, path: &str, body: &Val
         .unwrap()
 }
 
-/// A frame in a form.
 pub fn part(frame: Vec<u8>) -> Part {
     Part::bytes(frame).file_name("frame.png")
 }
 
-/// A form with these frames.
 pub fn form(frames: impl IntoIterator<Item = Vec<u8>>) -> Form {
     let add = |form: Form, frame| form.part("frame", part(frame));
     frames.into_iter().fold(Form::new(), add)

@@ -10,7 +10,6 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The frames of the clip.
 const FRAMES: u64 = 60;
 /// In frame 30: the target of the sample clip, and a piece of its ground.
 const BOXES: [&str; 2] = ["55,72,46,58", "200,30,40,40"];

@@ -47,7 +47,6 @@ impl KeySet {
         }
     }
 
-    /// How many there are.
     pub(super) fn len(&self) -> usize {
         self.0.len()
     }

@@ -180,7 +180,6 @@ impl SessionService {
     }
 }
 
-/// Bytes of the largest file.
 pub(super) fn largest(files: &[Bytes]) -> usize {
     files.iter().map(Bytes::len).max().unwrap_or(0)
 }

@@ -143,7 +143,6 @@ impl SessionService {
         }
     }
 
-    /// Opens a session under this id.
     async fn open_as(&self, request: OpenRequest, id: Uuid) -> Result<Arc<Session>, OpenError> {
         let OpenRequest {
             owner,

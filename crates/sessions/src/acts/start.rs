@@ -33,7 +33,6 @@ impl Start {
         }
     }
 
-    /// Bytes of its file.
     pub(super) fn file_bytes(&self) -> usize {
         match self {
             Self::Frame { file, .. } | Self::Snapshot(file) => file.len(),

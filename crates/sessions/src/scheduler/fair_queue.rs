@@ -122,7 +122,6 @@ impl FairQueue {
         given
     }
 
-    /// Workers that have work.
     pub(super) fn running(&self) -> usize {
         self.lock().running()
     }

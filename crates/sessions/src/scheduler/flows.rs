@@ -164,7 +164,6 @@ impl<G> Flows<G> {
         }
     }
 
-    /// Requests at work.
     pub(super) fn running(&self) -> usize {
         self.running.iter().sum()
     }

@@ -68,7 +68,6 @@ impl Places {
         self.queue.available_permits()
     }
 
-    /// Places that are taken.
     pub(super) fn len(&self) -> usize {
         self.taken().values().sum()
     }

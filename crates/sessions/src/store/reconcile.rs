@@ -84,7 +84,6 @@ mod tests {
     use super::*;
     use crate::store::record::tests::record;
 
-    /// A name for a step.
     fn named(step: &Step) -> &'static str {
         match step {
             Step::Commit(_) => "commit",

@@ -87,7 +87,6 @@ pub fn picture(number: u32) -> Bytes {
     png(scene).into()
 }
 
-/// Pictures of these numbers.
 pub fn pictures(numbers: std::ops::Range<u32>) -> Vec<Bytes> {
     numbers.map(picture).collect()
 }

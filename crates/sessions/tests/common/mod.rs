@@ -60,7 +60,6 @@ pub fn parts(registry: Registry, admission: Admission, limit: Duration) -> Servi
     }
 }
 
-/// The keys of snapshots.
 pub fn keys() -> MacKeys {
     MacKeys::new("bagtrack tests of stores", &["secret"])
 }

@@ -76,7 +76,6 @@ impl HostileStore {
         self.wire.lock().unwrap()
     }
 
-    /// A request begins.
     pub fn begin(&self) -> Busy {
         self.wire().busy += 1;
         Busy(self.clone())
@@ -118,7 +117,6 @@ impl HostileStore {
         }
     }
 
-    /// A call is lost.
     pub fn lose_call(&self, pick: usize) {
         let mut wire = self.wire();
         let Some(sender) = wire.calls.remove(pick).sender else {
@@ -147,7 +145,6 @@ impl HostileStore {
         wire.calls.push(again);
     }
 
-    /// The record is lost.
     pub fn forget(&self) {
         self.wire().records.forget();
         self.drop_creates();

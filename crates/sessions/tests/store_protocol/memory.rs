@@ -135,7 +135,6 @@ impl Backend for Records {
         *self.secret.get_or_insert(new)
     }
 
-    /// Loses all records.
     fn forget(&mut self) {
         self.kept.clear();
     }

@@ -29,7 +29,6 @@ impl Broadcast {
     }
 }
 
-/// Changes each number.
 pub(crate) fn map(values: &mut [f32], function: impl Fn(f32) -> f32) {
     for value in values {
         *value = function(*value);
@@ -56,7 +55,6 @@ pub(crate) fn combine(
     }
 }
 
-/// The mean of each channel.
 pub(crate) fn average(of: &Tensor) -> Result<Tensor, &'static str> {
     let (channels, height, width) = of.image().ok_or("its input is no image")?;
     let planes = of.values.chunks_exact((height * width).max(1));

@@ -49,7 +49,6 @@ pub(crate) fn integers(bytes: &[u8]) -> Result<Vec<i64>, ModelError> {
     Ok(values)
 }
 
-/// `bytes` as a text.
 pub(crate) fn text(bytes: &[u8]) -> Result<String, ModelError> {
     let text = str::from_utf8(bytes).map_err(|_| ModelError::NotOnnx("a name is not UTF-8"))?;
     Ok(text.to_owned())

@@ -26,7 +26,6 @@ pub struct Program {
 }
 
 impl Program {
-    /// With these flags and variables.
     pub fn start(flags: &[&str], variables: &[(&str, &str)]) -> Self {
         let mut command = serve(&program("bagtrack"));
         command.args(flags).envs(variables.iter().copied());

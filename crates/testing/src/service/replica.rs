@@ -21,7 +21,6 @@ impl Replica {
         Self::start_in(&[], flags)
     }
 
-    /// With these variables.
     pub fn start_in(environment: &[(&str, &str)], flags: &[&str]) -> Self {
         Self::start_program(&program("bagtrack"), environment, flags)
     }
@@ -43,7 +42,6 @@ impl Replica {
         }
     }
 
-    /// With the store at this URL.
     pub fn with_store(url: &str, flags: &[&str]) -> Self {
         Self::start(&[&["--store", url], flags].concat())
     }
@@ -83,7 +81,6 @@ impl Replica {
         self.process.kill();
     }
 
-    /// Asks it to end.
     pub fn ask_to_end(&self) {
         self.process.signal(Signal::TERM);
     }

@@ -112,7 +112,6 @@ impl StreamClient {
         }
     }
 
-    /// The next message.
     pub async fn message(&mut self) -> Value {
         match self.receive().await {
             Received::Message(message) => message,

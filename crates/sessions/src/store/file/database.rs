@@ -117,7 +117,6 @@ impl Tables {
     }
 }
 
-/// The open database.
 pub(super) struct Database {
     folder: PathBuf,
     /// Has handles of the others, so it is waited for before they are dropped.
@@ -248,13 +247,11 @@ impl Database {
         }
     }
 
-    /// What was noted of the time.
     pub(super) fn noted_time(&self) -> fjall::Result<Noted> {
         let noted = self.begin(0).note(CLOCK)?;
         Ok(noted.map_or_else(Noted::default, Noted::from_bytes))
     }
 
-    /// Notes the time.
     pub(super) fn note_time(&mut self, noted: Noted) -> fjall::Result<()> {
         let mut transaction = self.begin(0);
         transaction.put_note(CLOCK, &noted.to_bytes());
@@ -262,7 +259,6 @@ impl Database {
         self.account(&written)
     }
 
-    /// Syncs what was written.
     pub(super) fn sync(&self) -> fjall::Result<()> {
         self.inner.persist(PersistMode::SyncData)
     }
@@ -387,7 +383,6 @@ pub(super) struct Written {
 }
 
 impl Transaction<'_> {
-    /// Writes it.
     pub(super) fn write(self, mode: PersistMode) -> fjall::Result<Written> {
         self.inner.durability(Some(mode)).commit()?;
         Ok(Written {

@@ -129,7 +129,6 @@ impl Transaction<'_> {
             .insert(&self.tables.states, *id.as_bytes(), bytes);
     }
 
-    /// Drops what belongs to a session.
     fn drop_session(&mut self, id: Uuid) {
         self.inner.remove(&self.tables.rows, *id.as_bytes());
         self.inner.remove(&self.tables.states, *id.as_bytes());

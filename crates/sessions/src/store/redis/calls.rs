@@ -237,7 +237,6 @@ impl RedisStore {
         Ok(())
     }
 
-    /// Runs a script on a session.
     fn on<'a>(&self, script: &'a Script, name: SessionName) -> ScriptCall<'a> {
         let SessionName { id, incarnation } = name;
         let mut invocation = script.key(self.key(id));

@@ -33,7 +33,6 @@ pub trait ScriptServer: fmt::Debug + Send + Sync {
     ) -> RedisFuture<'a, Value>;
 }
 
-/// A script.
 pub(super) struct Script {
     text: String,
     hashed: redis::Script,
@@ -55,7 +54,6 @@ impl Script {
         }
     }
 
-    /// The script on this key.
     pub(super) fn key(&self, key: impl Into<String>) -> ScriptCall<'_> {
         ScriptCall {
             script: self,
@@ -73,7 +71,6 @@ impl ScriptCall<'_> {
         self
     }
 
-    /// With this argument too.
     pub(super) fn arg(&mut self, arg: impl ToRedisArgs) -> &mut Self {
         self.args.extend(arg.to_redis_args());
         self
