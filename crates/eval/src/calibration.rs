@@ -83,16 +83,7 @@ pub fn calibration_error_leave_one_out(videos: &[Vec<Outcome>]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn outcomes(pairs: &[(f64, u8)]) -> Vec<Outcome> {
-        pairs
-            .iter()
-            .map(|&(score, hit)| Outcome {
-                score,
-                hit: hit == 1,
-            })
-            .collect()
-    }
+    use crate::isotonic::tests::outcomes;
 
     fn close(found: Option<f64>, expected: f64) {
         let found = found.expect("there is a figure");

@@ -68,10 +68,11 @@ impl Isotonic {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    fn outcomes(pairs: &[(f64, u8)]) -> Vec<Outcome> {
+    /// Scores, with whether each was a hit.
+    pub(crate) fn outcomes(pairs: &[(f64, u8)]) -> Vec<Outcome> {
         pairs
             .iter()
             .map(|&(score, hit)| Outcome {
