@@ -3,19 +3,16 @@
 use bagtrack_demux::{DemuxError, Index, Sample, index};
 use std::fs::File;
 use std::io::{Cursor, Read, Seek, SeekFrom};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
-const H264: &[&str] = &[
-    "-c:v",
-    "libx264",
-    "-preset",
-    "veryfast",
-    "-x264-params",
-    "bframes=3:b-adapt=0:keyint=12",
-];
-const FRAGMENTS: &[&str] = &["-movflags", "frag_keyframe+empty_moov+default_base_moof"];
-const SOUND: &[&str] = &["-f", "lavfi", "-i", "sine=duration=2", "-c:a", "aac"];
+const H264: &str = "-c:v libx264 -preset veryfast -x264-params bframes=3:b-adapt=0:keyint=12";
+const VP8: &str = "-c:v libvpx -deadline realtime";
+const VP9: &str = "-c:v libvpx-vp9 -deadline realtime -cpu-used 8";
+const FRAGMENTS: &str = "-movflags frag_keyframe+empty_moov+default_base_moof";
+/// Such fragments with pictures that are shown before they are decoded.
+const NEGATIVE: &str = "-movflags frag_keyframe+empty_moov+negative_cts_offsets";
+const SOUND: &str = "-f lavfi -i sine=duration=2 -c:a aac";
 
 #[derive(Debug)]
 struct Packet {
@@ -25,29 +22,14 @@ struct Packet {
 }
 
 /// A video of 50 frames; none are at a time that three divides, from the second on.
-fn made(folder: &Path, name: &str, options: &[&[&str]]) -> std::path::PathBuf {
+fn made(folder: &Path, name: &str, options: &[&str]) -> PathBuf {
     let path = folder.join(name);
-    let (sound, rest): (Vec<&[&str]>, Vec<&[&str]>) = options.iter().partition(|it| **it == SOUND);
-    let source = [
-        "-f",
-        "lavfi",
-        "-i",
-        "testsrc=size=128x96:rate=25:duration=2",
-    ];
-    let varying = [
-        "-vf",
-        "select='lt(n,2)+mod(n,3)'",
-        "-fps_mode",
-        "vfr",
-        "-pix_fmt",
-        "yuv420p",
-    ];
+    let source = "-v error -f lavfi -i testsrc=size=128x96:rate=25:duration=2";
+    let varying = "-vf select='lt(n,2)+mod(n,3)' -fps_mode vfr -pix_fmt yuv420p";
+    let (sound, rest): (Vec<&str>, Vec<&str>) = options.iter().partition(|it| **it == SOUND);
+    let flags = [&[source][..], &sound, &[varying], &rest].concat();
     let status = Command::new("ffmpeg")
-        .args(["-v", "error"])
-        .args(source)
-        .args(sound.concat())
-        .args(varying)
-        .args(rest.concat())
+        .args(flags.iter().flat_map(|flags| flags.split(' ')))
         .arg(&path)
         .status()
         .expect("ffmpeg runs");
@@ -56,19 +38,10 @@ fn made(folder: &Path, name: &str, options: &[&[&str]]) -> std::path::PathBuf {
 }
 
 fn ffprobe(path: &Path, entries: &str) -> Vec<Vec<String>> {
+    let flags = "-v error -select_streams v -show_data_hash CRC32 -of csv=p=0 -show_entries";
     let output = Command::new("ffprobe")
-        .args([
-            "-v",
-            "error",
-            "-select_streams",
-            "v",
-            "-show_data_hash",
-            "CRC32",
-            "-of",
-            "csv=p=0",
-            "-show_entries",
-            entries,
-        ])
+        .args(flags.split(' '))
+        .arg(entries)
         .arg(path)
         .output()
         .expect("ffprobe runs");
@@ -126,35 +99,18 @@ fn agree(told: &[Packet], found: &[Packet]) -> bool {
 #[ignore = "needs ffmpeg"]
 fn the_samples_of_each_kind_of_file_are_those_that_ffprobe_tells() {
     let folder = tempfile::tempdir().expect("a folder");
-    let vp9: &[&str] = &[
-        "-c:v",
-        "libvpx-vp9",
-        "-deadline",
-        "realtime",
-        "-cpu-used",
-        "8",
-    ];
-    let vp8: &[&str] = &[
-        "-c:v",
-        "libvpx",
-        "-deadline",
-        "realtime",
-        "-cpu-used",
-        "8",
-        "-g",
-        "12",
-    ];
-    let live: &[&str] = &["-live", "1", "-cluster_time_limit", "300"];
-    let cases: [(&str, &[&[&str]], &str); 9] = [
+    let live = "-live 1 -cluster_time_limit 300";
+    let vp8 = format!("{VP8} -cpu-used 8 -g 12");
+    let cases: [(&str, &[&str], &str); 9] = [
         ("h264.mp4", &[H264, SOUND], "avc1."),
         ("h264.mov", &[H264], "avc1."),
-        ("begin.mp4", &[H264, &["-movflags", "faststart"]], "avc1."),
+        ("begin.mp4", &[H264, "-movflags faststart"], "avc1."),
         ("fragments.mp4", &[H264, FRAGMENTS, SOUND], "avc1."),
         ("h264.mkv", &[H264, SOUND], "avc1."),
-        ("vp9.mp4", &[vp9], "vp09."),
-        ("vp9.webm", &[vp9], "vp09."),
-        ("vp8.webm", &[vp8], "vp8"),
-        ("live.webm", &[vp8, live], "vp8"),
+        ("vp9.mp4", &[VP9], "vp09."),
+        ("vp9.webm", &[VP9], "vp09."),
+        ("vp8.webm", &[&vp8], "vp8"),
+        ("live.webm", &[&vp8, live], "vp8"),
     ];
     for (name, options, codec) in cases {
         let path = made(folder.path(), name, options);
@@ -174,8 +130,7 @@ fn the_samples_of_each_kind_of_file_are_those_that_ffprobe_tells() {
 #[ignore = "needs ffmpeg"]
 fn pictures_in_fragments_may_be_shown_before_they_are_decoded() {
     let folder = tempfile::tempdir().expect("a folder");
-    let negative: &[&str] = &["-movflags", "frag_keyframe+empty_moov+negative_cts_offsets"];
-    let path = made(folder.path(), "negative.mp4", &[H264, negative]);
+    let path = made(folder.path(), "negative.mp4", &[H264, NEGATIVE]);
     let index = index(File::open(&path).expect("it is there")).expect("an index");
     let made = (0..50)
         .filter(|frame| *frame < 2 || frame % 3 > 0)
@@ -277,10 +232,7 @@ fn a_trimmed_video_shows_what_is_left_of_it() {
 fn a_file_that_ends_too_early_is_refused_or_has_the_samples_before() {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, options) in [
-        (
-            "whole.webm",
-            &[&["-c:v", "libvpx", "-deadline", "realtime"][..]][..],
-        ),
+        ("whole.webm", &[VP8][..]),
         ("fragments.mp4", &[H264, FRAGMENTS]),
     ] {
         let path = made(folder.path(), name, options);
@@ -341,8 +293,7 @@ fn re_mp4_alone_misreads_fragments() {
                 .any(|it| it.composition_timestamp > 1 << 31)
         })
     };
-    let negative: &[&str] = &["-movflags", "frag_keyframe+empty_moov+negative_cts_offsets"];
-    let path = made(folder.path(), "negative.mp4", &[H264, negative]);
+    let path = made(folder.path(), "negative.mp4", &[H264, NEGATIVE]);
     assert!(is_late(&path), "offsets below zero are read: mended");
 
     let ends = |path: &Path| {
@@ -365,11 +316,7 @@ fn re_mp4_alone_misreads_fragments() {
 #[ignore = "needs ffmpeg"]
 fn matroska_demuxer_alone_takes_an_unknown_size_for_one() {
     let folder = tempfile::tempdir().expect("a folder");
-    let path = made(
-        folder.path(),
-        "part.webm",
-        &[&["-c:v", "libvpx", "-deadline", "realtime"]],
-    );
+    let path = made(folder.path(), "part.webm", &[VP8]);
     let mut bytes = std::fs::read(&path).expect("it can be read");
     let cluster = [0x1f, 0x43, 0xb6, 0x75];
     let first = bytes
