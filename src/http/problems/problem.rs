@@ -218,9 +218,9 @@ impl Problem {
 
 /// Makes the constructors of problems whose text is always the same.
 macro_rules! fixed {
-    ($($(#[doc = $doc:literal])* $name:ident: $kind:ident $detail:literal;)*) => {
+    ($($name:ident: $kind:ident $detail:literal;)*) => {
         impl Problem {
-            $($(#[doc = $doc])* pub fn $name() -> Self {
+            $(pub fn $name() -> Self {
                 Self::new(Kind::$kind, $detail)
             })*
         }
