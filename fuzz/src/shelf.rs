@@ -243,12 +243,4 @@ impl SessionStore for Shelf {
     fn secret(&self, new: [u8; 32]) -> StoreFuture<'_, [u8; 32]> {
         Box::pin(async move { Ok(new) })
     }
-
-    fn is_ready(&self) -> bool {
-        true
-    }
-
-    fn failures(&self) -> u64 {
-        0
-    }
 }

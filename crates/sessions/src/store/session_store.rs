@@ -109,8 +109,10 @@ pub trait SessionStore: Debug + Send + Sync {
     /// A random number that all who use the store have in common and clients do not know: `new`, if there is none yet.
     fn secret(&self, new: [u8; 32]) -> StoreFuture<'_, [u8; 32]>;
 
-    /// Whether the store answers and takes writes.
-    fn is_ready(&self) -> bool;
+    /// Whether the store answers and takes writes. One that is never away always does.
+    fn is_ready(&self) -> bool {
+        true
+    }
 
     /// Whether it is so full that it takes no further session.
     fn is_full(&self) -> bool {
@@ -118,5 +120,7 @@ pub trait SessionStore: Debug + Send + Sync {
     }
 
     /// How many calls got no answer or were refused since the start.
-    fn failures(&self) -> u64;
+    fn failures(&self) -> u64 {
+        0
+    }
 }

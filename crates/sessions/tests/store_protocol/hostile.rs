@@ -283,12 +283,4 @@ impl SessionStore for HostileStore {
     fn secret(&self, new: [u8; 32]) -> StoreFuture<'_, [u8; 32]> {
         self.call(false, move |records| records.secret(new))
     }
-
-    fn is_ready(&self) -> bool {
-        true
-    }
-
-    fn failures(&self) -> u64 {
-        0
-    }
 }

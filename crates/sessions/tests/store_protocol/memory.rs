@@ -196,12 +196,4 @@ impl SessionStore for MemoryStore {
     fn secret(&self, new: [u8; 32]) -> StoreFuture<'_, [u8; 32]> {
         at_once(self.records().secret(new))
     }
-
-    fn is_ready(&self) -> bool {
-        true
-    }
-
-    fn failures(&self) -> u64 {
-        0
-    }
 }
