@@ -16,7 +16,6 @@ mod advance;
 mod box_check;
 mod error;
 mod find;
-mod flush;
 mod frames;
 mod idempotency;
 mod open;
@@ -26,7 +25,6 @@ mod sync;
 mod track;
 mod tracking_metrics;
 mod turn;
-mod work;
 
 pub use box_check::{ImplausibleBox, box_warnings};
 pub use error::{ActError, FrameFault, FramesError, OpenError, QuotaExhausted, TrackError};

@@ -1,9 +1,13 @@
-//! What the acts share.
+//! What the acts share: the parts of the service, and work on its worker threads.
 
 use super::idempotency::IdempotencyStore;
 use super::tracking_metrics::TrackingMetrics;
+use crate::clock::{self, timeout};
 use crate::streams::OpenStreams;
-use crate::{Admission, MacKeys, Registry, SessionStore};
+use crate::{
+    Admission, MacKeys, NoOutcome, QueuePermit, Registry, SessionStore, Stopped, WorkLimit,
+    WorkMeter, WorkPanicked,
+};
 use bagtrack_tracker::Expert;
 use metrics::Histogram;
 use std::sync::Arc;
@@ -84,5 +88,36 @@ impl SessionService {
     /// Drops what is kept on behalf of sessions that have ended.
     pub fn prune(&self) {
         self.opened.prune(|id| self.registry.is_live(id));
+    }
+
+    /// Runs `work` on a worker, within the time that a request may take.
+    ///
+    /// The deadline ends the waiting at once. Work that has begun looks at it between frames, and at whether its client has
+    /// gone. Until it has ended it keeps its permits and the session's lock.
+    ///
+    /// # Errors
+    /// Its time is over, it waited too long for a worker, it panicked, or its own error.
+    pub async fn run<T, E, F>(&self, queue: QueuePermit, work: F) -> Result<T, E>
+    where
+        T: Send + 'static,
+        E: From<Stopped> + From<WorkPanicked> + Send + 'static,
+        F: FnOnce(&mut WorkMeter) -> Result<T, E> + Send + 'static,
+    {
+        let deadline = clock::now() + self.settings.work_timeout;
+        let max_cpu = self.settings.max_request_cpu;
+        let max_cpu = max_cpu.saturating_mul(queue.cpu_share());
+        let limit = WorkLimit::new(deadline, max_cpu, queue.spent().clone());
+        let _client = limit.abandon_on_drop();
+        let (asked, waited) = (clock::now(), self.queue_wait.clone());
+        let work = self.admission.run(queue, move |turn| {
+            waited.record(asked.elapsed().as_secs_f64());
+            work(&mut limit.start(turn))
+        });
+        match timeout(self.settings.work_timeout, work).await {
+            Ok(Ok(done)) => done,
+            Ok(Err(NoOutcome::Overload)) => Err(Stopped::Overload.into()),
+            Ok(Err(NoOutcome::Panicked(panicked))) => Err(panicked.into()),
+            Err(_) => Err(Stopped::Deadline.into()),
+        }
     }
 }

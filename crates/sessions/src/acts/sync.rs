@@ -1,4 +1,5 @@
-//! Synchronises a cached session with the store, and renews its time to live.
+//! Synchronises cached sessions with the store: brings them up to it, renews their time to live, and writes their states
+//! outside of requests.
 //!
 //! Memory is a cache of the store: another replica may have gone on with a session that is in memory here.
 
@@ -6,7 +7,7 @@ use super::error::ActError;
 use super::service::SessionService;
 use crate::clock::timeout;
 use crate::planted::PlantedFault;
-use crate::store::{Gone, Intent, Local, Outcome, Step, reconcile};
+use crate::store::{Commit, Gone, Intent, Local, Outcome, Step, StoreUnavailable, reconcile};
 use crate::{
     Flow, LockedSession, NoSession, QueuePermit, Session, SessionBusy, SessionPermit, SessionState,
     Stopped, WorkMeter, WorkPanicked,
@@ -206,6 +207,51 @@ impl SessionService {
         };
         self.registry.forget(session);
         error
+    }
+
+    /// Writes the states of all sessions whose last frames have no checkpoint.
+    pub async fn flush(&self) {
+        for session in self.registry.all() {
+            let is_behind = |session: &Session| {
+                let checkpoint = session.checkpoint();
+                checkpoint.is_some_and(|checkpoint| checkpoint < session.latest_frame())
+            };
+            if is_behind(&session)
+                && let Ok(permit) = session.read_permit()
+                && let Ok(mut locked) = permit.lock().await
+                && is_behind(&session)
+            {
+                let name = session.short_id();
+                match self.write(&mut locked).await {
+                    Ok(true) => {}
+                    Ok(false) => tracing::debug!(session = name, "another replica has it"),
+                    Err(error) => tracing::error!(%error, session = name, "not written"),
+                }
+            }
+        }
+    }
+
+    /// Writes a session's state as it is. False where the store has another version.
+    async fn write(&self, locked: &mut LockedSession) -> Result<bool, StoreUnavailable> {
+        let session = locked.session().clone();
+        let (Some(store), Some(before)) = (&self.store, session.version()) else {
+            return Ok(true);
+        };
+        let (bytes, frame) = (locked.state().stored(), locked.state().latest_frame());
+        let commit = Commit {
+            name: session.name(),
+            before,
+            frame,
+            state: Some(&bytes),
+            takes_over: false,
+            // What is left by this clock may be nothing after a jump, and the store would drop the record.
+            ttl: self.registry.idle_lease(),
+        };
+        let is_written = matches!(store.commit(commit).await?, Outcome::Committed(_));
+        if is_written {
+            session.set_version(Some(before.committed(frame, true)));
+        }
+        Ok(is_written)
     }
 }
 
