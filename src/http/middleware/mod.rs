@@ -8,16 +8,15 @@
 pub mod answer_problems;
 pub mod authenticate;
 pub mod base_path;
-pub mod check_origin;
 pub mod client_identity;
 pub mod cors;
 pub mod count_requests;
 pub mod draining;
 #[cfg(feature = "otel")]
 pub mod exported_span;
+pub mod host_and_origin;
 pub mod lingering_close;
 pub mod request_log;
 pub mod request_rate;
 pub mod security_headers;
-pub mod single_host;
 pub mod trace_context;

@@ -1,4 +1,5 @@
-//! Refuses requests that a browser sends for a page of another origin, or under the name of another host.
+//! Refuses requests that do not name one host, and those that a browser sends for a page of another origin, or under the
+//! name of another host.
 //!
 //! A browser sends "simple" posts of any page without asking first; CORS only hides the answer from the page. So the
 //! origin is checked, too. So is the [host](AllowedHosts).
@@ -6,14 +7,25 @@
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::extract::{Request, State};
-use axum::http::HeaderMap;
 use axum::http::header::{HOST, ORIGIN};
+use axum::http::{HeaderMap, Version};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use bagtrack_access::AllowedHosts;
 use bagtrack_config::Config;
 
-/// The middleware.
+/// Refuses requests that do not name one host (RFC 9112, section 3.2): caches and proxies before the service might take
+/// another one of several.
+pub async fn one_host(request: Request, next: Next) -> Response {
+    let count = request.headers().get_all(HOST).iter().count();
+    let may_lack = request.version() < Version::HTTP_11;
+    if count == 1 || (count == 0 && may_lack) {
+        return next.run(request).await;
+    }
+    let detail = format!("A request has one `Host` header, and this one has {count}.");
+    Problem::malformed(detail).into_response()
+}
+
 pub async fn check_origin(State(state): State<AppState>, request: Request, next: Next) -> Response {
     let hosts = AllowedHosts::of(&state.config, state.access.is_needed());
     match check(&state.config, hosts, &request) {
