@@ -1,7 +1,7 @@
 //! In which form a client wants its answer.
 
-use axum::http::HeaderMap;
 use axum::http::header::ACCEPT;
+use axum::http::{HeaderMap, HeaderName};
 use bagtrack_api::media_types::LINES;
 
 /// The form of an answer.
@@ -18,28 +18,32 @@ pub enum AnswerForm {
 impl AnswerForm {
     /// The form that the header `Accept` likes best; JSON where it names none of them.
     pub fn of(headers: &HeaderMap) -> Self {
-        let values = headers.get_all(ACCEPT).iter();
-        let texts = values.filter_map(|value| value.to_str().ok());
         let mut best = (0.0, Self::Json);
-        for range in texts.flat_map(|text| text.split(',')) {
-            let (name, parameters) = range.split_once(';').unwrap_or((range, ""));
-            let form = match name.trim().to_ascii_lowercase().as_str() {
+        for (name, quality) in qualities(headers, ACCEPT) {
+            let form = match name.as_str() {
                 LINES | "application/ndjson" | "application/jsonl" => Self::Lines,
                 "image/png" => Self::Picture,
                 "application/json" | "application/*" | "*/*" => Self::Json,
                 _ => continue,
             };
-            let quality = parameters.split(';').find_map(|parameter| {
-                let value = parameter.trim().strip_prefix("q=")?;
-                value.trim().parse().ok()
-            });
-            let quality: f32 = quality.unwrap_or(1.0);
             if quality > best.0 {
                 best = (quality, form);
             }
         }
         best.1
     }
+}
+
+/// What a client takes, by a header that is a list: names in lower case, and their qualities (RFC 9110, section 12.4.2).
+pub fn qualities(headers: &HeaderMap, name: HeaderName) -> impl Iterator<Item = (String, f32)> {
+    let values = headers.get_all(name).into_iter();
+    let texts = values.filter_map(|value| value.to_str().ok());
+    texts.flat_map(|text| text.split(',')).map(|item| {
+        let mut parts = item.split(';').map(str::trim);
+        let name = parts.next().unwrap_or_default().to_ascii_lowercase();
+        let quality = parts.find_map(|part| part.strip_prefix("q=")?.trim().parse().ok());
+        (name, quality.unwrap_or(1.0))
+    })
 }
 
 #[cfg(test)]

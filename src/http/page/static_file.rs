@@ -3,12 +3,13 @@
 //! Each is compressed once, when it is first asked for, so that no request costs the processor time of another. A tag
 //! tells whether a browser has the file already. It is a weak one, since both encodings have it.
 
+use crate::http::extract::answer_form::qualities;
 use axum::body::Bytes;
 use axum::http::header::{
     ACCEPT_ENCODING, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_SECURITY_POLICY, CONTENT_TYPE, ETAG,
     IF_NONE_MATCH, VARY,
 };
-use axum::http::{HeaderMap, HeaderName, StatusCode};
+use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use std::sync::{Arc, OnceLock};
 use zlib_rs::{DeflateConfig, ReturnCode, compress_bound, compress_slice};
@@ -71,7 +72,9 @@ impl StaticFile {
 
     /// Whether the client has this file.
     fn is_known(&self, headers: &HeaderMap) -> bool {
-        let mut tags = items(headers, IF_NONE_MATCH);
+        let values = headers.get_all(IF_NONE_MATCH).into_iter();
+        let texts = values.filter_map(|value| value.to_str().ok());
+        let mut tags = texts.flat_map(|text| text.split(',')).map(str::trim);
         tags.any(|tag| tag == "*" || tag.strip_prefix("W/").unwrap_or(tag) == self.tag)
     }
 
@@ -105,25 +108,10 @@ fn gzip(bytes: &[u8]) -> Option<Bytes> {
 
 /// Whether the client takes gzip: it is named, or all encodings are, with a quality above 0.
 fn takes_gzip(headers: &HeaderMap) -> bool {
-    let quality = |item: &str| {
-        let mut parts = item.split(';').map(str::trim);
-        let name = parts.next()?.to_ascii_lowercase();
-        let quality = parts.find_map(|part| part.strip_prefix("q=")?.parse::<f32>().ok());
-        Some((name, quality.unwrap_or(1.0)))
-    };
-    let named: Vec<_> = items(headers, ACCEPT_ENCODING)
-        .filter_map(quality)
-        .collect();
+    let named: Vec<_> = qualities(headers, ACCEPT_ENCODING).collect();
     let of = |wanted: &str| named.iter().find(|(name, _)| name == wanted);
     let found = of("gzip").or_else(|| of("x-gzip")).or_else(|| of("*"));
     found.is_some_and(|(_, quality)| *quality > 0.0)
-}
-
-/// The items of a header that is a list.
-fn items(headers: &HeaderMap, name: HeaderName) -> impl Iterator<Item = &str> {
-    let values = headers.get_all(name).into_iter();
-    let texts = values.filter_map(|value| value.to_str().ok());
-    texts.flat_map(|text| text.split(',')).map(str::trim)
 }
 
 #[cfg(test)]
