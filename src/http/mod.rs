@@ -53,4 +53,5 @@ pub use resources::routes::document as openapi_document;
 pub use server::application::{Application, Shutdown};
 pub use server::bind_error::BindError;
 pub use server::connection_service::ConnectionService;
-pub use server::service::{Parts, Service};
+pub use server::service::Service;
+pub use state::Parts;

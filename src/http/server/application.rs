@@ -7,9 +7,9 @@
 use super::bind_error::BindError;
 use super::connection_service::ConnectionService;
 use super::refusal;
-use super::service::{Parts, Service};
+use super::service::Service;
 use crate::http::problems::problem::Problem;
-use crate::http::state::AppState;
+use crate::http::state::{AppState, Parts};
 use axum::Router;
 #[cfg(feature = "jwt")]
 use bagtrack_access::JwtError;

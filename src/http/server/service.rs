@@ -3,31 +3,15 @@
 use super::bind_error::BindError;
 use crate::http::server::connection_service::ConnectionService;
 use crate::http::server::router::router;
-use crate::http::state::AppState;
+use crate::http::state::{AppState, Parts};
 use axum::{Extension, Router};
 use bagtrack_access::Access;
 use bagtrack_config::Config;
 use bagtrack_net::Peer;
 use bagtrack_net::Security;
 use bagtrack_sessions::clock::interval;
-use bagtrack_sessions::{Clock, Executor, SessionStore};
-use bagtrack_tracker::Expert;
 use std::net::SocketAddr;
-use std::sync::Arc;
 use std::time::Duration;
-
-/// What a service is made of, beside its settings.
-#[derive(Debug)]
-pub struct Parts {
-    /// What sessions expire by.
-    pub clock: Clock,
-    /// What keeps them. The store that the settings name is not looked at.
-    pub store: Option<Arc<dyn SessionStore>>,
-    /// What gives a second opinion. The network that the settings name is not looked at.
-    pub expert: Option<Arc<dyn Expert>>,
-    /// What decodes and tracks.
-    pub executor: Executor,
-}
 
 /// The service, which listens nowhere: for simulations, which bring its requests themselves. Clones are the same.
 #[derive(Debug, Clone)]
@@ -52,14 +36,9 @@ impl Service {
 
     /// The same, with settings and keys that were checked.
     pub(super) fn of(config: Config, access: Access, parts: Parts) -> Self {
-        let Parts {
-            clock,
-            store,
-            expert,
-            executor,
-        } = parts;
-        let state = AppState::new(config, access, clock, store, expert, executor);
-        Self { state }
+        Self {
+            state: AppState::new(config, access, parts),
+        }
     }
 
     /// The routes, as a client at this address meets them.

@@ -55,17 +55,28 @@ impl std::ops::Deref for AppState {
     }
 }
 
+/// What a service is made of, beside its settings.
+#[derive(Debug)]
+pub struct Parts {
+    /// What sessions expire by.
+    pub clock: Clock,
+    /// What keeps them. The store that the settings name is not looked at.
+    pub store: Option<Arc<dyn SessionStore>>,
+    /// What gives a second opinion in every session. The network that the settings name is not looked at.
+    pub expert: Option<Arc<dyn Expert>>,
+    /// What decodes and tracks.
+    pub executor: Executor,
+}
+
 impl AppState {
-    /// The state of a service with these settings and keys, this clock, and what its work is done by. `expert`
-    /// gives a second opinion in every session.
-    pub fn new(
-        config: Config,
-        access: Access,
-        clock: Clock,
-        store: Option<Arc<dyn SessionStore>>,
-        expert: Option<Arc<dyn Expert>>,
-        executor: Executor,
-    ) -> Self {
+    /// The state of a service with these settings, keys and parts.
+    pub fn new(config: Config, access: Access, parts: Parts) -> Self {
+        let Parts {
+            clock,
+            store,
+            expert,
+            executor,
+        } = parts;
         let metrics = Metrics::new();
         let clients = Clients::new(&config, store.is_some());
         let service = SessionService::new(ServiceParts {
