@@ -2,16 +2,21 @@
 //!
 //! Memory is charged before it is taken: a body that only announces its length, or sends nothing, holds none. Bytes are
 //! copied into one buffer as they arrive, since a chunk of one byte by itself takes many times that.
+//!
+//! A body has a least rate: a client that sends a byte now and then would hold its connection and its session's place
+//! until the deadline of the body.
 
-use super::pace::{TooSlow, paced};
 use crate::http::problems::problem::Problem;
 use axum::body::{Body, Bytes};
 use axum::extract::multipart::MultipartError;
 use axum::http::StatusCode;
 use bagtrack_config::Config;
+use bagtrack_net::LeastRate;
 use bagtrack_sessions::{BudgetFull, Charge};
+use futures_util::{StreamExt, stream};
 use http_body_util::{BodyExt, LengthLimitError, Limited};
 use std::error::Error;
+use std::task::{Poll, ready};
 use tower_http::timeout::TimeoutError;
 
 /// Bytes that a buffer begins with, where the body is not smaller.
@@ -24,6 +29,11 @@ pub(super) const MAX_HEAD_BYTES: usize = 16 << 10;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the head of a part has more than {MAX_HEAD_BYTES} bytes")]
 pub(super) struct HeadTooLong;
+
+/// The body came more slowly than it may.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the body is too slow")]
+struct TooSlow;
 
 /// Bytes that arrive, with the memory that they are charged to.
 pub(super) struct Buffer<'a> {
@@ -67,6 +77,33 @@ impl<'a> Buffer<'a> {
     pub(super) fn finish(self) -> Bytes {
         self.bytes.into()
     }
+}
+
+/// A body that fails when it is slower than these settings say. Where its reader keeps what arrives, `charge` pays for
+/// that.
+pub(super) fn paced(body: Body, config: &Config, mut charge: Option<Charge>) -> Body {
+    let limits = &config.limits;
+    let rate = LeastRate::new(limits.body_grace, limits.min_body_rate);
+    // What comes early may be followed by a pause.
+    let mut rate = rate.with_credit(config.body_timeout);
+    let mut pieces = body.into_data_stream();
+    let mut pay = move |piece: &Bytes| match &mut charge {
+        Some(charge) => charge.grow(piece.len()).map_err(axum::Error::new),
+        None => Ok(()),
+    };
+    Body::from_stream(stream::poll_fn(move |cx| {
+        match pieces.poll_next_unpin(cx) {
+            Poll::Ready(Some(Ok(piece))) => {
+                rate.moved(piece.len());
+                Poll::Ready(Some(pay(&piece).map(|()| piece)))
+            }
+            Poll::Ready(other) => Poll::Ready(other),
+            Poll::Pending => {
+                ready!(rate.poll_late(cx));
+                Poll::Ready(Some(Err(axum::Error::new(TooSlow))))
+            }
+        }
+    }))
 }
 
 /// Reads the whole body.

@@ -1,11 +1,12 @@
 //! Who makes a request.
 
 use crate::http::problems::problem::Problem;
+use crate::http::state::AppState;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use bagtrack_access::Credential;
 use bagtrack_quotas::Client;
-use bagtrack_sessions::{Owner, SessionName};
+use bagtrack_sessions::{Flow, Owner, Session, SessionName};
 use std::io;
 use std::net::Ipv4Addr;
 use std::sync::Arc;
@@ -49,14 +50,26 @@ impl Caller {
         self.only.map(|only| only.id)
     }
 
-    /// Whether a session of this id may be used, if it is one of the owner's: see [`Self::may_use`].
+    /// Whether a session of this id may be used, if it is one of the owner's: see [`Self::find`].
     pub fn may_ask_for(&self, id: Uuid) -> bool {
         self.only.is_none_or(|only| only.id == id)
     }
 
-    /// Whether this session of the owner's may be used.
-    pub fn may_use(&self, session: SessionName) -> bool {
-        self.only.is_none_or(|only| only == session)
+    /// The owner's live session of this id, if it may be used.
+    ///
+    /// # Errors
+    /// There is none, or the store gives no answer.
+    pub async fn find(
+        &self,
+        state: &AppState,
+        id: Uuid,
+        flow: Flow,
+    ) -> Result<Arc<Session>, Problem> {
+        let session = state.service.find(id, self.owner(), flow).await?;
+        match self.only.is_none_or(|only| only == session.name()) {
+            true => Ok(session),
+            false => Err(Problem::session_not_found()),
+        }
     }
 
     /// Refuses what a session token is not good for.

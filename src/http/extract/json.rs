@@ -1,10 +1,13 @@
-//! JSON uploads: `frame` and `frames` are base64, all other fields are settings.
+//! JSON uploads: `frame` and `frames` are base64, possibly as a data URL or broken into lines; all other fields are
+//! settings.
 
-use super::base64_file;
 use super::misnamed;
 use super::texts::Fields;
 use crate::http::problems::problem::Problem;
 use bagtrack_api::requests::{FrameCount, Settings};
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use base64::{DecodeError, Engine};
+use bytes::Bytes;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::value::RawValue;
 use std::borrow::Cow;
@@ -22,6 +25,12 @@ const NANOS_PER_BYTE: u64 = 2;
 pub(super) fn least_time(bytes: usize) -> Duration {
     Duration::from_nanos((bytes as u64).saturating_mul(NANOS_PER_BYTE))
 }
+
+/// Standard base64, with or without padding.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &base64::alphabet::STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
 
 /// Most fields of an object; no route takes nearly as many.
 const MAX_FIELDS: usize = 32;
@@ -81,15 +90,13 @@ pub(super) fn read<S: Settings>(
     for (name, value) in members {
         match &*name {
             _ if value.get() == "null" => {}
-            "frame" => fields
-                .files
-                .push(base64_file::decode(&text(&name, value)?)?),
+            "frame" => fields.files.push(decode(&text(&name, value)?)?),
             "snapshot" if S::TAKES_SNAPSHOT && fields.snapshot.is_none() => {
-                fields.snapshot = Some(base64_file::decode(&text(&name, value)?)?);
+                fields.snapshot = Some(decode(&text(&name, value)?)?);
             }
             "frames" if S::FRAMES == FrameCount::Several => {
                 for text in frames(value, max_files)? {
-                    fields.files.push(base64_file::decode(&text)?);
+                    fields.files.push(decode(&text)?);
                 }
             }
             _ => {
@@ -124,4 +131,41 @@ fn text<'a>(name: &str, value: &'a RawValue) -> Result<Cow<'a, str>, Problem> {
             .map(Cow::Owned)
             .map_err(|_| Problem::malformed(format!("`{name}` must be a string."))),
     }
+}
+
+/// The file of a text.
+///
+/// # Errors
+/// It is not base64.
+fn decode(text: &str) -> Result<Bytes, Problem> {
+    if let Some((scheme, _)) = text.trim_start().split_once("://")
+        && scheme.chars().all(|c| c.is_ascii_alphanumeric())
+    {
+        let detail = "A file is given as a URL, and URLs are not fetched. Send its bytes as base64, or as the body.";
+        return Err(Problem::malformed(detail));
+    }
+    let encoded = match text.strip_prefix("data:") {
+        Some(url) => {
+            let split = url.split_once(";base64,").map(|(_, encoded)| encoded);
+            split
+                .ok_or_else(|| Problem::malformed("A data URL must be `data:image/…;base64,…`."))?
+        }
+        None => text,
+    };
+    let has_space = encoded.bytes().any(|byte| byte.is_ascii_whitespace());
+    let decoded = if has_space {
+        BASE64.decode(encoded.split_ascii_whitespace().collect::<String>())
+    } else {
+        BASE64.decode(encoded)
+    };
+    decoded.map(Bytes::from).map_err(|error| {
+        if let DecodeError::InvalidByte(_, b'-' | b'_') = error {
+            let detail =
+                "A file is base64 for URLs; send it in the standard alphabet, with `+` and `/`.";
+            return Problem::malformed(detail);
+        }
+        let error = error.to_string();
+        let reason = error.trim_end_matches('.');
+        Problem::malformed(format!("A file is not base64: {reason}."))
+    })
 }

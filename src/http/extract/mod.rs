@@ -14,8 +14,8 @@
 //! What can go wrong: the body is slow, too large or not what it says; parsed JSON takes many times the memory of its
 //! text; a setting is unknown, doubled or no value of its type. Each is a problem document, and no session changes.
 
+pub mod admitted;
 pub mod answer_form;
-pub mod base64_file;
 mod body;
 pub mod caller;
 pub mod idempotency_key;
@@ -24,12 +24,8 @@ mod json;
 mod misnamed;
 mod multipart;
 pub mod overrides;
-mod pace;
 pub mod query;
-pub mod read_request;
 pub mod session_path;
-pub mod session_request;
-pub mod stateless_request;
 pub mod texts;
 pub mod uploaded;
 pub mod video_frames;

@@ -34,12 +34,8 @@ impl<S: Send + Sync> FromRequestParts<S> for SessionPath {
 impl SessionPath {
     /// The caller's live session of this id. Text that is not an id is the id of no session.
     pub async fn find(&self, state: &AppState) -> Result<Arc<Session>, Problem> {
-        let (owner, flow) = (self.caller.owner(), state.flow(&self.client));
-        let session = state.service.find(self.id()?, owner, flow).await?;
-        match self.caller.may_use(session.name()) {
-            true => Ok(session),
-            false => Err(Problem::session_not_found()),
-        }
+        let flow = state.flow(&self.client);
+        self.caller.find(state, self.id()?, flow).await
     }
 
     /// The same, with its last answer up to the store's.

@@ -1,14 +1,13 @@
 //! The frames and settings of a request, whichever form they came in.
 
-use super::body;
+use super::body::{self, paced};
 use super::caller::client_of;
 use super::json;
 use super::multipart;
-use super::pace::paced;
 use super::texts::{Fields, Texts};
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
-use axum::body::Bytes;
+use axum::body::{Body, Bytes};
 use axum::extract::Request;
 use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE};
 use axum::http::request::Parts;
@@ -47,19 +46,21 @@ pub struct Upload<S> {
 }
 
 impl<S: Settings> Upload<S> {
-    /// Reads the body, then takes a place in the queue; `texts` are the settings of the query, where the body has none of
-    /// their names. JSON is parsed on a worker. The place holds `permit` until the request's work has ended, and the files
-    /// their memory.
+    /// Lets a request in, reads its body, then takes a place in the queue; `texts` are the settings of the query, where the
+    /// body has none of their names. JSON is parsed on a worker. The place holds the request's permit until its work has
+    /// ended, and the files their memory.
     ///
     /// # Errors
-    /// The body cannot be read, it has too few or too many frames, a setting is wrong, the queue is full, or the client
-    /// has sent too many frames lately.
+    /// The request is not let in, the body cannot be read, it has too few or too many frames, a setting is wrong, the queue
+    /// is full, or the client has sent too many frames lately.
     pub async fn read(
         state: &AppState,
-        permit: RequestPermit,
         texts: Texts,
-        request: Request,
+        parts: Parts,
+        body: Body,
     ) -> Result<(Self, QueuePermit), Problem> {
+        let permit = admit(state, &parts)?;
+        let request = Request::from_parts(parts, body);
         let max_files = match S::FRAMES {
             FrameCount::One => 1,
             FrameCount::Several => state.config.max_frames,
@@ -158,7 +159,7 @@ impl Arrived {
 ///
 /// # Errors
 /// The announced body is too large, the queue is full, or the client has too many requests in flight.
-pub fn admit(state: &AppState, parts: &Parts) -> Result<RequestPermit, Problem> {
+fn admit(state: &AppState, parts: &Parts) -> Result<RequestPermit, Problem> {
     let max = state.config.max_body_bytes;
     let length = parts.headers.get(CONTENT_LENGTH);
     let length = length.and_then(|length| length.to_str().ok()?.parse::<u64>().ok());

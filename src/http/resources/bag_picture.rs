@@ -1,8 +1,8 @@
 //! `GET /sessions/{id}/bag.png`: the bag as a contact sheet.
 
 use crate::drawing::ContactSheet;
+use crate::http::extract::admitted::ReadRequest;
 use crate::http::extract::query::QuerySettings;
-use crate::http::extract::read_request::ReadRequest;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::charged_body::{ChargedBody, charged_body};
 use crate::http::state::AppState;

@@ -1,7 +1,7 @@
 //! `PUT /sessions/{id}/target`: the user corrects the box.
 
+use crate::http::extract::admitted::SessionRequest;
 use crate::http::extract::overrides::rect;
-use crate::http::extract::session_request::SessionRequest;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::{answer, with_standing};
 use crate::http::respond::json::Json;

@@ -4,7 +4,7 @@
 //! tracked. A video has the processor time of as many requests as its frames would be posted in, and no end but that of
 //! its frames.
 
-use crate::http::extract::session_request::SessionRequest;
+use crate::http::extract::admitted::SessionRequest;
 use crate::http::extract::video_frames::VideoFrames;
 use crate::http::extract::video_place::{VideoPlace, count_frame};
 use crate::http::problems::problem::Problem;

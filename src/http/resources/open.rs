@@ -5,7 +5,6 @@ use crate::http::extract::idempotency_key;
 use crate::http::extract::overrides;
 use crate::http::extract::texts::Texts;
 use crate::http::extract::uploaded::Upload;
-use crate::http::extract::uploaded::admit;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::created_session::created;
 use crate::http::state::AppState;
@@ -127,9 +126,7 @@ impl FromRequest<AppState> for CreateRequest {
             let quota = ClientSessions(account.clone());
             state.service.check_room(&quota)?;
         }
-        let admitted = admit(state, &parts)?;
-        let request = Request::from_parts(parts, body);
-        let (upload, queue) = Upload::read(state, admitted, texts, request).await?;
+        let (upload, queue) = Upload::read(state, texts, parts, body).await?;
         Ok(Self {
             caller,
             key,

@@ -1,7 +1,7 @@
 //! `GET /sessions/{id}/snapshot`: a session as bytes, to go on elsewhere.
 
+use crate::http::extract::admitted::ReadRequest;
 use crate::http::extract::query::NoQuery;
-use crate::http::extract::read_request::ReadRequest;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::charged_body::{ChargedBody, charged_body};
 use crate::http::state::AppState;

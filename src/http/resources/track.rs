@@ -2,8 +2,8 @@
 
 use super::track_file::TrackFile;
 use super::track_video::{Track, VideoAnswers, VideoTrack};
+use crate::http::extract::admitted::StatelessRequest;
 use crate::http::extract::overrides;
-use crate::http::extract::stateless_request::StatelessRequest;
 use crate::http::extract::uploaded::Upload;
 use crate::http::extract::video_frames::VideoFrames;
 use crate::http::extract::video_place::VideoPlace;

@@ -1,6 +1,6 @@
 //! `POST /frames`: the frames of a video as pictures, for who cannot decode it.
 
-use crate::http::extract::stateless_request::StatelessRequest;
+use crate::http::extract::admitted::StatelessRequest;
 use crate::http::extract::video_frames::VideoFrames;
 use crate::http::extract::video_place::{VideoPlace, count_frame};
 use crate::http::problems::problem::Problem;

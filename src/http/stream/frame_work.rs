@@ -118,12 +118,7 @@ impl FrameWork {
             return Err(Problem::unauthorized());
         }
         let flow = self.account.flow();
-        let found = state.service.find(self.session, caller.owner(), flow);
-        let session = found.await?;
-        match caller.may_use(session.name()) {
-            true => Ok(session),
-            false => Err(Problem::session_not_found()),
-        }
+        caller.find(state, self.session, flow).await
     }
 
     /// Whether the caller may still use the session, which is there, and whether the stream has its place. Asks the
