@@ -1,6 +1,8 @@
 //! `bagtrack track` on a video, and videos that it draws. Most need ffmpeg.
 
-use crate::command::{about, bagtrack, boxes, clip, fails, folder, rows, succeeds, text, video_of};
+use crate::command::{
+    about, bagtrack, boxes, clip, fails, folder, probe, rows, succeeds, text, video_of,
+};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -67,17 +69,7 @@ fn each_ending_that_is_offered_becomes_a_video_of_this_kind() {
         let printed = succeeds(&["track", text(&dir), &target, "--draw", text(&video)]);
         assert_eq!(printed.lines().count(), 13, "{ending}: {printed}");
         assert_eq!(about(&video), format!("{size},25/1,12"), "{ending}");
-        let mut command = Command::new("ffprobe");
-        command.args([
-            "-v",
-            "error",
-            "-show_entries",
-            "format=format_name",
-            "-of",
-            "csv=p=0",
-        ]);
-        let format = command.arg(&video).output().expect("ffprobe starts").stdout;
-        let format = String::from_utf8(format).expect("text");
+        let format = probe(&video, "-show_entries format=format_name");
         assert!(format.contains(kind), "{ending}: {format}");
     }
 }
@@ -240,66 +232,33 @@ fn the_start_is_a_frame_or_a_time_and_what_is_before_it_is_passed_over() {
 fn the_start_is_exactly_the_frame_that_is_named_in_each_kind_of_file() {
     let parent = folder();
     let open = "open-gop=1:keyint=20:min-keyint=20";
-    let open_265 = format!("log-level=none:{open}");
+    let open_264 = format!("libx264 -x264-params {open} -bf 3");
+    let open_265 = format!("libx265 -x265-params log-level=none:{open} -bf 3");
     for (name, coded) in [
         // Frames before one that stands for itself are made from it, and from those before it.
-        (
-            "open.mp4",
-            ["-c:v", "libx264", "-x264-params", open, "-bf", "3"],
-        ),
-        (
-            "open.mkv",
-            ["-c:v", "libx264", "-x264-params", open, "-bf", "3"],
-        ),
-        (
-            "open.mov",
-            ["-c:v", "libx265", "-x265-params", &open_265, "-bf", "3"],
-        ),
+        ("open.mp4", &open_264[..]),
+        ("open.mkv", &open_264),
+        ("open.mov", &open_265),
         // With B-frames, and few frames that stand for themselves.
-        ("b.mp4", ["-c:v", "libx264", "-bf", "3", "-g", "20"]),
-        ("b.mkv", ["-c:v", "libx264", "-bf", "3", "-g", "20"]),
+        ("b.mp4", "libx264 -bf 3 -g 20"),
+        ("b.mkv", "libx264 -bf 3 -g 20"),
         // It counts in frames: a time between two of them is rounded to one.
-        (
-            "ticks.mp4",
-            [
-                "-c:v",
-                "libx264",
-                "-bf",
-                "0",
-                "-video_track_timescale",
-                "30",
-            ],
-        ),
-        (
-            "late.mov",
-            ["-c:v", "mpeg4", "-output_ts_offset", "3", "-g", "20"],
-        ),
-        (
-            "golden.webm",
-            ["-c:v", "libvpx-vp9", "-cpu-used", "8", "-g", "20"],
-        ),
+        ("ticks.mp4", "libx264 -bf 0 -video_track_timescale 30"),
+        ("late.mov", "mpeg4 -output_ts_offset 3 -g 20"),
+        ("golden.webm", "libvpx-vp9 -cpu-used 8 -g 20"),
         // Each third frame has the time of the one before, as in a recording that notes when frames came.
         (
             "burst.mkv",
-            [
-                "-c:v",
-                "mjpeg",
-                "-pix_fmt",
-                "yuvj420p",
-                "-bsf:v",
-                "setts=ts='if(eq(mod(N,3),1),N-1,N)/30/TB'",
-            ],
+            "mjpeg -pix_fmt yuvj420p -bsf:v setts=ts='if(eq(mod(N,3),1),N-1,N)/30/TB'",
         ),
-        ("stream.ts", ["-c:v", "libx264", "-bf", "3", "-g", "20"]),
-        ("old.avi", ["-c:v", "mpeg4", "-bf", "2", "-g", "20"]),
+        ("stream.ts", "libx264 -bf 3 -g 20"),
+        ("old.avi", "mpeg4 -bf 2 -g 20"),
     ] {
         let video = parent.path().join(name);
-        let mut command = Command::new("ffmpeg");
-        command.args(["-v", "error", "-f", "lavfi", "-i"]);
         let gray = "lum='20+4*N+25*mod(floor(X/8)+floor(Y/8)\\,2)':cb=128:cr=128";
-        command.arg(format!("color=size=96x64:rate=30:duration=1.5,geq={gray}"));
-        command.args(coded).args(["-b:v", "2M", text(&video)]);
-        assert!(command.status().expect("ffmpeg starts").success(), "{name}");
+        let source = format!("color=size=96x64:rate=30:duration=1.5,geq={gray}");
+        let coded = format!("-c:v {coded} -b:v 2M {name}");
+        ffmpeg_in(parent.path(), &format!("-f lavfi -i {source} {coded}"));
         for start in [0, 1, 19, 20, 21, 33, 44] {
             let pictures = parent.path().join(format!("{name}-{start}"));
             let start_at = start.to_string();
@@ -339,17 +298,12 @@ fn the_start_is_exactly_the_frame_that_is_named_in_each_kind_of_file() {
 #[ignore = "needs ffmpeg"]
 fn pictures_that_cannot_be_made_after_a_cut_have_no_numbers() {
     let parent = folder();
-    let [whole, cut] = ["whole.mkv", "cut.mkv"].map(|name| parent.path().join(name));
-    let ffmpeg = |arguments: &[&str]| {
-        let mut command = Command::new("ffmpeg");
-        let command = command.args(["-v", "error"]).args(arguments);
-        assert!(command.status().expect("ffmpeg starts").success());
-    };
+    let cut = parent.path().join("cut.mkv");
     let source = "color=size=96x64:rate=30:duration=2,geq=lum='20+3*N+25*mod(floor(X/8)+floor(Y/8)\\,2)':cb=128:cr=128";
     let coded = "log-level=none:open-gop=1:keyint=15:min-keyint=15:bframes=4:b-adapt=0";
-    let coded = ["-c:v", "libx265", "-x265-params", coded, text(&whole)];
-    ffmpeg(&[&["-f", "lavfi", "-i", source], &coded[..]].concat());
-    ffmpeg(&["-ss", "0.8", "-i", text(&whole), "-c", "copy", text(&cut)]);
+    let coded = format!("-c:v libx265 -x265-params {coded} whole.mkv");
+    ffmpeg_in(parent.path(), &format!("-f lavfi -i {source} {coded}"));
+    ffmpeg_in(parent.path(), "-ss 0.8 -i whole.mkv -c copy cut.mkv");
     let track = |start: usize| {
         let out = format!("{}/", text(&parent.path().join(start.to_string())));
         let start_at = start.to_string();
@@ -558,11 +512,8 @@ fn a_drawn_video_has_pixels_of_the_shape_of_the_source() {
         let (source, drawn) = (parent.path().join("wide.mp4"), parent.path().join(name));
         let flags = ["--box=50,40,30,30", "--draw", text(&drawn)];
         succeeds(&[&["track", text(&source)], &flags[..]].concat());
-        let mut command = Command::new("ffprobe");
-        command.args(["-v", "error", "-of", "csv=p=0", "-show_entries"]);
-        command.args(["stream=sample_aspect_ratio", text(&drawn)]);
-        let told = command.output().expect("ffprobe starts").stdout;
-        assert_eq!(String::from_utf8_lossy(&told).trim(), "16:11", "{name}");
+        let told = probe(&drawn, "-show_entries stream=sample_aspect_ratio");
+        assert_eq!(told, "16:11", "{name}");
     }
 }
 
@@ -654,13 +605,9 @@ fn frames_that_are_closer_than_the_rate_says_are_all_taken() {
     let parent = folder();
     let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
     let video = parent.path().join("bursts.mkv");
-    let mut command = Command::new("ffmpeg");
-    let frames = dir.join("img/%04d.jpg");
-    command.args(["-v", "error", "-framerate", "30", "-i", text(&frames)]);
-    let bursts = "settb=1/1000,setpts=if(lt(N\\,6)\\,N*5\\,N*60)";
-    command.args(["-vf", bursts, "-vsync", "passthrough"]);
-    command.args(["-enc_time_base", "1:1000", text(&video)]);
-    assert!(command.status().expect("ffmpeg starts").success());
+    let bursts = "settb=1/1000,setpts=if(lt(N\\,6)\\,N*5\\,N*60) -vsync passthrough";
+    let coded = format!("-vf {bursts} -enc_time_base 1:1000 {}", text(&video));
+    ffmpeg_in(&dir, &format!("-framerate 30 -i img/%04d.jpg {coded}"));
     let flags = ["track", text(&video), &target, "--format", "csv"];
     let times = |printed: &str| {
         let rows = rows(printed).into_iter();
@@ -687,29 +634,10 @@ fn times_are_those_of_the_video_also_where_its_rate_changes() {
     let parent = folder();
     let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
     let video = parent.path().join("uneven.mp4");
-    let mut command = Command::new("ffmpeg");
-    command.args([
-        "-v",
-        "error",
-        "-framerate",
-        "30",
-        "-i",
-        text(&dir.join("img/%04d.jpg")),
-    ]);
     // From frame 6 on they are 1 s later.
-    command.args([
-        "-vf",
-        "settb=1/1000,setpts=PTS+gte(N\\,6)*1000",
-        "-vsync",
-        "vfr",
-    ]);
-    assert!(
-        command
-            .arg(&video)
-            .status()
-            .expect("ffmpeg starts")
-            .success()
-    );
+    let late = "-vf settb=1/1000,setpts=PTS+gte(N\\,6)*1000 -vsync vfr";
+    let frames = format!("-framerate 30 -i img/%04d.jpg {late} {}", text(&video));
+    ffmpeg_in(&dir, &frames);
     let flags = ["track", text(&video), &target, "--format", "csv"];
     let found = rows(&succeeds(&flags));
     assert_eq!(found.len(), 12);
@@ -767,11 +695,7 @@ fn times_are_those_of_the_video_also_where_its_rate_changes() {
 
 /// When each frame of a video is shown, in seconds.
 fn shown_at(video: &Path) -> Vec<f64> {
-    let mut command = Command::new("ffprobe");
-    command.args(["-v", "error", "-select_streams", "v:0", "-of", "csv=p=0"]);
-    command.args(["-show_entries", "frame=pts_time", text(video)]);
-    let told = command.output().expect("ffprobe starts").stdout;
-    let told = String::from_utf8(told).expect("text");
+    let told = probe(video, "-select_streams v:0 -show_entries frame=pts_time");
     let times = told.lines().map(|line| line.trim_end_matches(','));
     // Some frames have a line of their own for what stands beside them.
     let times = times.filter(|time| !time.is_empty());

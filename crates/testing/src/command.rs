@@ -136,15 +136,17 @@ pub fn video_of(clip: &Path, video: &Path, times: u32) {
     assert!(command.status().expect("ffmpeg starts").success());
 }
 
+/// What ffprobe tells of a video when it is asked so.
+pub fn probe(video: &Path, asked: &str) -> String {
+    let mut command = Command::new("ffprobe");
+    command.args(["-v", "error", "-of", "csv=p=0"]);
+    let output = command.args(asked.split(' ')).arg(video).output();
+    let told = String::from_utf8(output.expect("ffprobe starts").stdout).expect("text");
+    told.trim().to_owned()
+}
+
 /// What ffprobe finds out about a video by decoding all of it: width, height, rate, number of frames.
 pub fn about(video: &Path) -> String {
-    let mut command = Command::new("ffprobe");
-    command.args(["-v", "error", "-count_frames", "-of", "csv=p=0"]);
-    command.args([
-        "-show_entries",
-        "stream=width,height,avg_frame_rate,nb_read_frames",
-    ]);
-    let output = command.arg(video).output().expect("ffprobe starts");
-    let told = String::from_utf8(output.stdout).expect("text");
-    told.trim().to_owned()
+    let entries = "stream=width,height,avg_frame_rate,nb_read_frames";
+    probe(video, &format!("-count_frames -show_entries {entries}"))
 }
