@@ -1,6 +1,7 @@
 //! What the clients upload: real videos where they are, else the project's sample clip.
 
 use bagtrack_sample::{Clip as Sample, Settings};
+use bagtrack_tracker::Rect;
 use image::ImageFormat;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -36,26 +37,15 @@ impl Clip {
             .collect();
         folders.sort();
         let folder = &folders[client % folders.len()];
-        let entries = std::fs::read_dir(folder.join("img")).expect("a folder of frames");
-        let mut paths: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
-        paths.sort();
-        let text = std::fs::read_to_string(folder.join("groundtruth_rect.txt")).unwrap();
-        let line = text.lines().next().expect("a first box");
-        let numbers = line.split([',', '\t', ' ']).filter(|text| !text.is_empty());
-        let numbers: Vec<f64> = numbers.map(|number| number.parse().unwrap()).collect();
+        let paths = bagtrack_cli::frames::list(folder).expect("a folder of frames");
+        let boxes = bagtrack_cli::read_boxes(folder).expect("the file is there");
         Self {
             frames: paths
                 .iter()
                 .take(frames)
                 .map(|path| std::fs::read(path).unwrap())
                 .collect(),
-            first_box: format!(
-                "{},{},{},{}",
-                numbers[0] - 1.0,
-                numbers[1] - 1.0,
-                numbers[2],
-                numbers[3]
-            ),
+            first_box: text(boxes[0].expect("a first box")),
         }
     }
 
@@ -66,7 +56,6 @@ impl Clip {
             ..Settings::default()
         })
         .expect("a clip");
-        let target = sample.target(0);
         let encode = |index: u32| {
             let mut bytes = Cursor::new(Vec::new());
             let picture = sample.draw(index);
@@ -75,10 +64,17 @@ impl Clip {
         };
         Self {
             frames: (0..u32::try_from(frames).unwrap()).map(encode).collect(),
-            first_box: format!(
-                "{},{},{},{}",
-                target.x, target.y, target.width, target.height
-            ),
+            first_box: text(sample.target(0)),
         }
     }
+}
+
+fn text(target: Rect) -> String {
+    let Rect {
+        x,
+        y,
+        width,
+        height,
+    } = target;
+    format!("{x},{y},{width},{height}")
 }

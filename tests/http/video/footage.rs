@@ -1,6 +1,7 @@
 //! Real video over HTTP.
 
 use crate::application::{TestApplication, expect};
+use bagtrack_cli::read_boxes;
 use bagtrack_ingest::Limits;
 use bagtrack_tracker::{Estimate, Preset, Rect, Tracker};
 use reqwest::StatusCode;
@@ -13,26 +14,21 @@ fn root() -> PathBuf {
 }
 
 fn frames(folder: &Path) -> Vec<Vec<u8>> {
-    let entries = std::fs::read_dir(folder.join("img")).unwrap();
-    let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
-    paths.sort();
-    paths
-        .iter()
-        .map(|path| std::fs::read(path).unwrap())
-        .collect()
+    let paths = bagtrack_cli::frames::list(folder).unwrap();
+    let files = paths.iter().map(|path| std::fs::read(path).unwrap());
+    files.collect()
 }
 
-/// The first box, in pixels counted from 0.
-fn first_box(folder: &Path) -> [f64; 4] {
-    let text = std::fs::read_to_string(folder.join("groundtruth_rect.txt")).unwrap();
-    let line = text.lines().next().unwrap();
-    let numbers = line
-        .split([',', '\t', ' '])
-        .map(|number| number.parse().unwrap());
-    let [x, y, width, height] = numbers.collect::<Vec<f64>>()[..] else {
-        panic!("{line} is no box")
-    };
-    [x - 1.0, y - 1.0, width, height]
+/// The first box, and its text in a query.
+fn first_box(folder: &Path) -> (Rect, String) {
+    let first = read_boxes(folder).unwrap()[0].expect("a first box");
+    let Rect {
+        x,
+        y,
+        width,
+        height,
+    } = first;
+    (first, format!("{x},{y},{width},{height}"))
 }
 
 fn assert_same(answer: &Value, estimate: &Estimate) {
@@ -61,21 +57,14 @@ async fn coke_over_http_gives_the_librarys_boxes() {
     let folder = root().join("Coke");
     let frames = frames(&folder);
     assert!(frames.len() > 100);
-    let [x, y, width, height] = first_box(&folder);
+    let (target, text) = first_box(&folder);
     let limits = Limits::default();
     let mut params = Preset::Paper.params();
     params.seed = 7;
-    let target = Rect {
-        x,
-        y,
-        width,
-        height,
-    };
     let first = bagtrack_ingest::decode(&frames[0], &limits).unwrap();
     let mut tracker = Tracker::new(&first, target, params).unwrap();
 
     let app = TestApplication::start().await;
-    let text = format!("{x},{y},{width},{height}");
     let query = [("box", text.as_str()), ("preset", "paper"), ("seed", "7")];
     let created = expect(
         app.create(frames[0].clone(), &query).await,
@@ -101,9 +90,7 @@ async fn a_session_of_real_video_is_stored_in_48_kib() {
         if !folder.is_dir() {
             continue;
         }
-        let text = first_box(&folder)
-            .map(|number| number.to_string())
-            .join(",");
+        let (_, text) = first_box(&folder);
         let frames = frames(&folder);
         let created = app
             .create(frames[0].clone(), &[("box", text.as_str())])
