@@ -6,4 +6,5 @@ mod following;
 mod lost_sessions;
 mod refusals;
 
-use bagtrack_testing::service::{application, lossy, pictures, replica};
+use bagtrack_testing::pictures;
+use bagtrack_testing::service::{application, lossy, replica};

@@ -10,4 +10,5 @@ mod sessions;
 mod streams;
 mod video;
 
-use bagtrack_testing::service::{application, pictures, program, stream_client};
+use bagtrack_testing::pictures;
+use bagtrack_testing::service::{application, program, stream_client};

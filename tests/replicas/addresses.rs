@@ -2,39 +2,19 @@
 
 use crate::clip::Clip;
 use crate::pair::json;
+use crate::processes::{Process, ask_redis, free_port, redis_server};
 use crate::replica::Replica;
-use crate::server::{Process, free_port, wait_for};
 use reqwest::{Client, StatusCode};
-use std::net::SocketAddr;
-use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 use tempfile::TempDir;
 use uuid::Uuid;
 
 const FRAMES: usize = 6;
 
-/// A server with these flags, in this folder.
-fn redis(folder: &Path, port: u16, flags: &[&str]) -> Process {
-    let mut command = Command::new("redis-server");
-    command.current_dir(folder).args(["--bind", "127.0.0.1"]);
-    command.args(["--save", ""]).args(flags);
-    let mut process = Process::start(&mut command);
-    wait_for(SocketAddr::from(([127, 0, 0, 1], port)), &mut process.0);
-    process
-}
-
-fn run(command: &mut Command) -> Output {
+fn run(command: &mut Command) {
     let output = command.output();
     let output = output.unwrap_or_else(|error| panic!("{command:?}: {error}"));
     assert!(output.status.success(), "{command:?}: {output:?}");
-    output
-}
-
-/// What a node answers.
-fn ask(port: u16, words: &[&str]) -> String {
-    let mut command = Command::new("redis-cli");
-    let output = run(command.args(["-p", &port.to_string()]).args(words));
-    String::from_utf8(output.stdout).expect("redis-cli writes UTF-8")
 }
 
 /// Two replicas with this store take the frames of some sessions in turns.
@@ -61,7 +41,7 @@ async fn replicas_share_sessions(environment: &[(&str, &str)], store: &str) {
 async fn a_store_behind_a_password() {
     let (folder, port) = (tempfile::tempdir().unwrap(), free_port());
     let flags = ["--port", &port.to_string(), "--requirepass", "s3cret"];
-    let _server = redis(folder.path(), port, &flags);
+    let _server = redis_server(folder.path(), port, &flags);
     replicas_share_sessions(&[], &format!("redis://:s3cret@127.0.0.1:{port}/1")).await;
     let locked_out = Replica::with_store(&format!("redis://127.0.0.1:{port}"), &[]);
     assert_eq!(
@@ -75,7 +55,7 @@ async fn a_store_behind_a_password() {
 async fn a_store_at_a_socket_file() {
     let (folder, port) = (tempfile::tempdir().unwrap(), free_port());
     let flags = ["--port", &port.to_string(), "--unixsocket", "redis.sock"];
-    let _server = redis(folder.path(), port, &flags);
+    let _server = redis_server(folder.path(), port, &flags);
     let url = format!("unix://{}", folder.path().join("redis.sock").display());
     replicas_share_sessions(&[], &url).await;
 }
@@ -99,7 +79,7 @@ async fn a_store_behind_tls_whose_certificate_is_checked() {
     let mut flags = vec!["--port", "0", "--tls-port", &number];
     flags.extend(["--tls-cert-file", &certificate, "--tls-key-file", &key]);
     flags.extend(["--tls-auth-clients", "no"]);
-    let _server = redis(folder.path(), port, &flags);
+    let _server = redis_server(folder.path(), port, &flags);
     let url = format!("rediss://127.0.0.1:{port}");
     replicas_share_sessions(&[("SSL_CERT_FILE", &certificate)], &url).await;
     // Nobody known has signed it.
@@ -123,7 +103,7 @@ async fn a_store_of_three_nodes() {
             "--cluster-port",
             &bus,
         ];
-        redis(folder.path(), *port, &flags)
+        redis_server(folder.path(), *port, &flags)
     };
     let _servers: Vec<Process> = nodes.iter().map(start).collect();
     let mut create = Command::new("redis-cli");
@@ -132,7 +112,7 @@ async fn a_store_of_three_nodes() {
     run(create.arg("--cluster-yes"));
     // A node that just started refuses keys for two seconds, however complete the cluster is.
     for (_, port) in &nodes {
-        while !ask(*port, &["cluster", "info"]).contains("cluster_state:ok") {
+        while !ask_redis(*port, &["cluster", "info"]).contains("cluster_state:ok") {
             std::thread::yield_now();
         }
     }
@@ -142,7 +122,7 @@ async fn a_store_of_three_nodes() {
     );
     replicas_share_sessions(&[], &url).await;
     let keys = nodes.iter().map(|(_, port)| {
-        let answer = ask(*port, &["dbsize"]);
+        let answer = ask_redis(*port, &["dbsize"]);
         let keys = answer.trim().parse::<usize>();
         keys.unwrap_or_else(|_| panic!("{answer}"))
     });

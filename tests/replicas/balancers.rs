@@ -1,6 +1,6 @@
 //! HAProxy and nginx with the configurations that the project ships, on free ports.
 
-use crate::server::{Process, free_port, wait_for};
+use crate::processes::{Process, free_port, wait_for};
 use std::net::SocketAddr;
 use std::process::Command;
 use tempfile::TempDir;

@@ -5,8 +5,8 @@
 use crate::balancers::{haproxy, nginx};
 use crate::clip::Clip;
 use crate::lossy::Lossy;
+use crate::processes::Redis;
 use crate::replica::Replica;
-use crate::server::Redis;
 use crate::tracks::{SECRET, Tracks, undisturbed};
 use rand::RngExt;
 use std::net::SocketAddr;

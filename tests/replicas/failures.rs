@@ -2,8 +2,8 @@
 
 use crate::clip::Clip;
 use crate::pair::{Pair, json};
+use crate::processes::Redis;
 use crate::replica::Replica;
-use crate::server::Redis;
 use crate::tracking_client::Track;
 use reqwest::{Client, Response, StatusCode};
 

@@ -21,4 +21,5 @@ mod tracks;
 mod trouble;
 mod upgrade;
 
-use bagtrack_testing::service::{lossy, replica, server, stream_client};
+use bagtrack_testing::processes;
+use bagtrack_testing::service::{lossy, replica, stream_client};

@@ -1,8 +1,8 @@
 //! Two replicas, and a session of theirs.
 
 use crate::clip::Clip;
+use crate::processes::Redis;
 use crate::replica::Replica;
-use crate::server::Redis;
 use crate::tracking_client::{Answer, Track};
 use bagtrack_testing::command::program;
 use reqwest::{Client, Response, StatusCode};

@@ -1,8 +1,8 @@
 //! What one client may have in the store that replicas share.
 
 use crate::clip::Clip;
+use crate::processes::Redis;
 use crate::replica::Replica;
-use crate::server::Redis;
 use bagtrack_testing::within::within;
 use reqwest::{Client, Response, StatusCode};
 

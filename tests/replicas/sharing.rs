@@ -2,8 +2,8 @@
 
 use crate::clip::Clip;
 use crate::pair::{Pair, json};
+use crate::processes::Redis;
 use crate::replica::Replica;
-use crate::server::Redis;
 use reqwest::{Client, StatusCode};
 use serde_json::Value;
 use uuid::Uuid;

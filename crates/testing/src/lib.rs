@@ -7,6 +7,8 @@
 //! | [`bench_pictures`] | the same as JPEG |
 //! | [`textbook`] | sections III-B and III-D of the paper as printed: the oracle of the tracker's evaluation |
 //! | [`picture_files`] | JPEG, PNG and WebP files of many forms |
+//! | [`pictures`] | drawn frames for the tests of the service, as files |
+//! | [`processes`] | other programs that the tests start, such as a Redis |
 //! | [`cpu_time`] | times of actions in turns, in processor time of the thread |
 //! | [`memory`] | memory of processes |
 //! | [`issuer`] | an issuer of JSON Web Tokens |
@@ -23,6 +25,8 @@ pub mod cpu_time;
 pub mod issuer;
 pub mod memory;
 pub mod picture_files;
+pub mod pictures;
+pub mod processes;
 pub mod scene;
 #[cfg(feature = "service")]
 pub mod service;

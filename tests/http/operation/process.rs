@@ -5,7 +5,7 @@ use crate::pictures;
 use crate::program::{self, Program};
 use crate::stream_client::StreamClient;
 use crate::streams::stream::problem_slug;
-use bagtrack_testing::service::server::Process;
+use bagtrack_testing::processes::Process;
 use bagtrack_testing::within::within;
 use reqwest::{Client, StatusCode};
 use rustix::process::Signal;

@@ -1,8 +1,7 @@
 //! Frames of a session: which are taken, which are refused, and what is answered.
 
-use crate::common::png;
 use crate::world::{
-    FIRST, PIXELS, SECOND, SIZE, at_first, open, parts, picture, pictures, place, post,
+    FIRST, PIXELS, SECOND, SIZE, at_first, open, parts, picture, pictures, place, png, post,
     post_numbered, request, service, small_picture,
 };
 use bagtrack_sessions::{
@@ -366,7 +365,7 @@ async fn each_answer_of_each_target_is_counted() {
         image::Luma([(x * 131 + y * 17) as u8 ^ (x * y) as u8])
     });
     let mut files = pictures(1..4);
-    files.extend(vec![bytes::Bytes::from(png(nothing)); 20]);
+    files.extend(vec![png(nothing); 20]);
     files.extend(pictures(4..10));
     let mut statuses: Vec<Vec<Status>> = vec![vec![Status::Tracking; 2]];
     // Requests of one frame, and of several.

@@ -1,14 +1,15 @@
 //! A service without a store, its client, and pictures.
 
-use crate::common::{self, png};
+use crate::common;
 use bagtrack_sessions::{
     Admission, Boxes, Clock, CreationKey, Executor, FrameBatch, FramesError, Lease, OpenError,
     OpenRequest, Opened, QuotaExhausted, Registry, Reservation, ServiceParts, Session,
     SessionQuota, SessionService, Start, StoreShare, Tracked,
 };
+use bagtrack_testing::pictures::{encode, scene};
 use bagtrack_tracker::Rect;
 use bytes::Bytes;
-use image::{GrayImage, Luma};
+use image::{GrayImage, ImageFormat, Luma};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -73,18 +74,21 @@ fn exhausted(what: &'static str, limit: usize) -> OpenError {
     QuotaExhausted { what, limit }.into()
 }
 
+pub fn png(picture: GrayImage) -> Bytes {
+    encode(picture, ImageFormat::Png).into()
+}
+
 /// Picture `number`. The first target has moved by two pixels to the right, and by one down, from each to the next.
 pub fn picture(number: u32) -> Bytes {
-    let patch = |x: u32, y: u32, left: u32, top: u32, width: u32, height: u32| {
-        let (dx, dy) = (x.wrapping_sub(left), y.wrapping_sub(top));
-        (dx < width && dy < height).then(|| 150 + ((dx * 5) ^ (dy * 9)) as u8 % 100)
-    };
-    let scene = GrayImage::from_fn(SIZE.0, SIZE.1, |x, y| {
-        let first = patch(x, y, 20 + 2 * number, 15 + number, 16, 12);
-        let target = first.or_else(|| patch(x, y, 60, 40, 20, 16));
-        Luma([target.unwrap_or(40 + ((x * 3) ^ (y * 7)) as u8 % 60)])
-    });
-    png(scene).into()
+    let mut scene = scene(number);
+    for (x, y, pixel) in scene.enumerate_pixels_mut() {
+        let (dx, dy) = (x.wrapping_sub(60), y.wrapping_sub(40));
+        // The first target is before it, and the ground is darker than both.
+        if dx < 20 && dy < 16 && pixel.0[0] < 100 {
+            *pixel = Luma([150 + ((dx * 5) ^ (dy * 9)) as u8 % 100]);
+        }
+    }
+    png(scene)
 }
 
 pub fn pictures(numbers: std::ops::Range<u32>) -> Vec<Bytes> {
@@ -93,7 +97,7 @@ pub fn pictures(numbers: std::ops::Range<u32>) -> Vec<Bytes> {
 
 /// A picture of another size.
 pub fn small_picture() -> Bytes {
-    png(GrayImage::new(48, 48)).into()
+    png(GrayImage::new(48, 48))
 }
 
 /// The parts of a service whose work is done at once, on the thread that asks for it.

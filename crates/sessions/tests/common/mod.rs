@@ -1,4 +1,4 @@
-//! What the tests of acts and those of stores share: a service, its requests, and pictures.
+//! What the tests of acts and those of stores share: a service and its requests.
 
 use bagtrack_sessions::{
     Admission, CreationKey, Flow, IdempotencyStore, MacKeys, OpenRequest, OpenStreams, Owner,
@@ -6,9 +6,7 @@ use bagtrack_sessions::{
     TrackingMetrics,
 };
 use bagtrack_tracker::{Params, Preset, Rect};
-use image::{DynamicImage, GrayImage, ImageFormat};
 use metrics::Histogram;
-use std::io::Cursor;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -21,13 +19,6 @@ pub const FIRST: Rect = Rect {
     width: 16.0,
     height: 12.0,
 };
-
-pub fn png(scene: GrayImage) -> Vec<u8> {
-    let mut bytes = Cursor::new(Vec::new());
-    let scene = DynamicImage::ImageLuma8(scene);
-    scene.write_to(&mut bytes, ImageFormat::Png).unwrap();
-    bytes.into_inner()
-}
 
 /// Parameters with which a frame takes little time.
 pub fn params() -> Params {

@@ -1,10 +1,11 @@
 //! The frames that a client and its rival send, and the boxes that each history of them has.
 
-use crate::common::{self, FIRST, png};
+use crate::common::{self, FIRST};
 use bagtrack_ingest::{Limits, decode_to};
 use bagtrack_sessions::Estimates;
+use bagtrack_testing::pictures::{encode, scene_at};
 use bagtrack_tracker::{Frame, Params, Tracker};
-use image::{GrayImage, Luma};
+use image::ImageFormat;
 use std::collections::HashMap;
 use std::sync::{Mutex, OnceLock};
 
@@ -21,15 +22,7 @@ pub fn picture(sender: u8, number: u64) -> Vec<u8> {
         0 => (20 + 2 * number, 15 + number),
         _ => (21 + number, 15 + 2 * number),
     };
-    let scene = GrayImage::from_fn(96, 72, |x, y| {
-        let (dx, dy) = (x.wrapping_sub(left), y.wrapping_sub(top));
-        Luma([if dx < 16 && dy < 12 {
-            150 + ((dx * 5) ^ (dy * 9)) as u8 % 100
-        } else {
-            40 + ((x * 3) ^ (y * 7)) as u8 % 60
-        }])
-    });
-    png(scene)
+    encode(scene_at(left, top), ImageFormat::Png)
 }
 
 pub fn params(seed: u64) -> Params {

@@ -5,10 +5,11 @@ use crate::suite::{TTL, holds_for, is_committed, record, told};
 use bagtrack_sessions::{
     Commit, Counted, Outcome, RedisAddress, RedisStore, SessionName, SessionStore, StoreShare,
 };
+use bagtrack_testing::processes::{Process, free_port, redis_server};
 use redis::FromRedisValue;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
-use std::process::{Child, Command, Stdio};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
@@ -18,29 +19,21 @@ const LONG: Duration = Duration::from_secs(5);
 
 /// A Redis that ends with the test.
 pub struct Redis {
-    process: Child,
+    _process: Process,
     pub port: u16,
 }
 
 impl Redis {
     pub fn start() -> Self {
-        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
-        let port = listener.local_addr().expect("it is bound").port();
-        drop(listener);
-        Self::start_at(port)
+        Self::start_at(free_port())
     }
 
     fn start_at(port: u16) -> Self {
-        let mut command = Command::new("redis-server");
-        command.args(["--bind", "127.0.0.1", "--save", "", "--port"]);
-        let command = command.arg(port.to_string()).stdout(Stdio::null());
-        let mut process = command.spawn().expect("redis-server is installed");
-        while TcpStream::connect(("127.0.0.1", port)).is_err() {
-            let ended = process.try_wait().expect("it was started");
-            assert!(ended.is_none(), "redis-server has ended: {ended:?}");
-            std::thread::yield_now();
+        let flags = ["--port", &port.to_string()];
+        Self {
+            _process: redis_server(Path::new("."), port, &flags),
+            port,
         }
-        Self { process, port }
     }
 
     pub async fn store(&self, timeout: Duration) -> RedisStore {
@@ -55,13 +48,6 @@ impl Redis {
         command
             .query(&mut client.get_connection().unwrap())
             .unwrap()
-    }
-}
-
-impl Drop for Redis {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
     }
 }
 

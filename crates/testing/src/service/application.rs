@@ -1,6 +1,6 @@
 //! The service on a free port, driven by named methods.
 
-use super::pictures;
+use crate::pictures;
 use bagtrack::http::{Application, Config};
 use bagtrack_sessions::Clock;
 use reqwest::{Client, Method, RequestBuilder, Response, StatusCode, Url};

@@ -1,7 +1,7 @@
 //! `bagtrack serve` as a process, whose log tells its address.
 
-use super::server::Process;
 use crate::command::program;
+use crate::processes::Process;
 use crate::within::PATIENCE;
 use rustix::process::Signal;
 use std::convert::Infallible;

@@ -1,7 +1,7 @@
 //! `bagtrack serve` as a process, which can be killed and started again at its address.
 
-use super::server::{Process, free_port, wait_for};
 use crate::command::program;
+use crate::processes::{Process, free_port, wait_for};
 use reqwest::StatusCode;
 use rustix::process::Signal;
 use std::net::SocketAddr;

@@ -1,14 +1,18 @@
 //! Frames drawn here: a textured target that moves over a textured ground.
 
+use crate::picture_files;
 use image::{DynamicImage, GrayImage, ImageFormat, Luma};
-use std::io::Cursor;
 
 pub const WIDTH: u32 = 96;
 pub const HEIGHT: u32 = 72;
 
 /// The scene at frame `t`: the target is 16 x 12 pixels, at (20, 15) in frame 0, and moves by (2, 1) a frame.
 pub fn scene(t: u32) -> GrayImage {
-    let (left, top) = (20 + 2 * t, 15 + t);
+    scene_at(20 + 2 * t, 15 + t)
+}
+
+/// The scene with the upper left corner of the target at this place.
+pub fn scene_at(left: u32, top: u32) -> GrayImage {
     GrayImage::from_fn(WIDTH, HEIGHT, |x, y| {
         let (dx, dy) = (x.wrapping_sub(left), y.wrapping_sub(top));
         Luma([if dx < 16 && dy < 12 {
@@ -20,13 +24,11 @@ pub fn scene(t: u32) -> GrayImage {
 }
 
 pub fn encode(picture: GrayImage, format: ImageFormat) -> Vec<u8> {
-    let mut bytes = Cursor::new(Vec::new());
-    let picture = match format {
-        ImageFormat::WebP => DynamicImage::ImageRgb8(DynamicImage::ImageLuma8(picture).to_rgb8()),
-        _ => DynamicImage::ImageLuma8(picture),
-    };
-    picture.write_to(&mut bytes, format).unwrap();
-    bytes.into_inner()
+    let picture = DynamicImage::ImageLuma8(picture);
+    match format {
+        ImageFormat::WebP => picture_files::encode(&picture.to_rgb8().into(), format),
+        _ => picture_files::encode(&picture, format),
+    }
 }
 
 pub fn png(t: u32) -> Vec<u8> {

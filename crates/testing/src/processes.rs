@@ -6,7 +6,6 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use tempfile::TempDir;
 
-/// A port that is free now.
 pub fn free_port() -> u16 {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     listener.local_addr().expect("it is bound").port()
@@ -37,7 +36,6 @@ impl Process {
         kill_process(id, signal).expect("it runs");
     }
 
-    /// `kill -9`.
     pub fn kill(&mut self) {
         self.0.kill().expect("it was started");
         self.0.wait().expect("it was started");
@@ -49,6 +47,25 @@ impl Drop for Process {
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
+}
+
+/// A Redis in this folder. It keeps nothing, unless these flags say so.
+pub fn redis_server(folder: &Path, port: u16, flags: &[&str]) -> Process {
+    let mut command = Command::new("redis-server");
+    command.current_dir(folder).args(["--bind", "127.0.0.1"]);
+    command.args(["--save", ""]).args(flags);
+    let mut process = Process::start(&mut command);
+    wait_for(SocketAddr::from(([127, 0, 0, 1], port)), &mut process.0);
+    process
+}
+
+/// What the Redis at this port answers to a command.
+pub fn ask_redis(port: u16, words: &[&str]) -> String {
+    let mut command = Command::new("redis-cli");
+    let output = command.args(["-p", &port.to_string()]).args(words).output();
+    let output = output.unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    assert!(output.status.success(), "{command:?}: {output:?}");
+    String::from_utf8(output.stdout).expect("redis-cli writes UTF-8")
 }
 
 /// A Redis with an append-only file, written before each answer.
@@ -71,13 +88,16 @@ impl Redis {
     }
 
     fn process(folder: &Path, address: SocketAddr) -> Process {
-        let mut command = Command::new("redis-server");
-        command.current_dir(folder).args(["--bind", "127.0.0.1"]);
-        command.args(["--port", &address.port().to_string(), "--save", ""]);
-        command.args(["--appendonly", "yes", "--appendfsync", "always"]);
-        let mut process = Process::start(&mut command);
-        wait_for(address, &mut process.0);
-        process
+        let port = address.port().to_string();
+        let flags = [
+            "--port",
+            &port,
+            "--appendonly",
+            "yes",
+            "--appendfsync",
+            "always",
+        ];
+        redis_server(folder, address.port(), &flags)
     }
 
     pub fn url(&self) -> String {
@@ -99,12 +119,7 @@ impl Redis {
 
     /// What it answers to a command.
     pub fn ask(&self, words: &[&str]) -> String {
-        let mut command = Command::new("redis-cli");
-        command.args(["-p", &self.address.port().to_string()]);
-        let output = command.args(words).output();
-        let output = output.unwrap_or_else(|error| panic!("{command:?}: {error}"));
-        assert!(output.status.success(), "{command:?}: {output:?}");
-        String::from_utf8(output.stdout).expect("redis-cli writes UTF-8")
+        ask_redis(self.address.port(), words)
     }
 
     pub fn start_again(&mut self) {
