@@ -208,7 +208,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn each_step_is_measured_for_itself() {
+    fn each_step_is_measured_for_itself_and_a_loss_is_counted() {
         let metrics = Metrics::new();
         let before = PerTarget::One(Estimate {
             frame: 0,
@@ -218,12 +218,18 @@ mod tests {
         });
         let steps = [1, 1, 100].map(Duration::from_millis);
         let tracking = &metrics.tracking;
-        tracking.tracked(&before, &[before.clone(), before.clone()], &steps);
+        let lost = before.map(|estimate| Estimate {
+            status: Status::Lost,
+            ..*estimate
+        });
+        tracking.tracked(&before, &[before.clone(), lost], &steps);
         let text = metrics.render();
         for line in [
             "bagtrack_frame_step_seconds_bucket{le=\"0.002\"} 2",
             "bagtrack_frame_step_seconds_bucket{le=\"0.064\"} 2",
             "bagtrack_frame_step_seconds_bucket{le=\"0.128\"} 3",
+            "bagtrack_frames_total{status=\"lost\"} 1",
+            "bagtrack_targets_lost_total 1",
         ] {
             assert!(text.contains(line), "{line}:\n{text}");
         }

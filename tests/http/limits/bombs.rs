@@ -53,19 +53,6 @@ async fn the_size_of_the_last_frame_is_checked_before_the_first_is_decoded() {
 }
 
 #[tokio::test]
-async fn the_processor_time_of_a_request_is_bounded() {
-    let app = TestApplication::start_with(|config| {
-        config.limits.max_request_cpu = Duration::from_millis(2);
-    });
-    let app = app.await;
-    let session = heavy::open(&app).await;
-    let response = heavy::post(&app, &session, 64).send().await.unwrap();
-    expect_problem(response, "request-too-costly").await;
-    let view = expect(app.get(&session).await, StatusCode::OK).await;
-    assert_eq!(view["frames"], 1, "none of them was tracked");
-}
-
-#[tokio::test]
 async fn work_past_its_deadline_stops_at_the_next_frame() {
     let app = TestApplication::start_with(|config| {
         config.workers = Some(1);

@@ -112,36 +112,6 @@ async fn requests_frames_problems_and_sizes_are_counted() {
 }
 
 #[tokio::test]
-async fn a_target_that_goes_out_of_sight_is_counted_once() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
-    let mut lost = Vec::new();
-    // Far beyond the edge: the ground alone.
-    let away = pictures::png(1000);
-    for t in 1..40 {
-        let frame = if t < 20 {
-            pictures::png(t)
-        } else {
-            away.clone()
-        };
-        let answer = expect(app.post_frame(&id, frame).await, StatusCode::OK).await;
-        lost.push(answer["status"] == "lost");
-    }
-    let losses = lost.windows(2).filter(|pair| !pair[0] && pair[1]).count();
-    assert!(losses >= 1, "the test needs a target that is lost");
-    let text = metrics(&app).await;
-    assert_eq!(
-        value(&text, "bagtrack_targets_lost_total", &[]),
-        losses as f64
-    );
-    let frames = lost.iter().filter(|lost| **lost).count();
-    assert_eq!(
-        value(&text, "bagtrack_frames_total", &["status=\"lost\""]),
-        frames as f64
-    );
-}
-
-#[tokio::test]
 async fn services_in_one_process_count_for_themselves() {
     let (one, other) = (
         TestApplication::start().await,
