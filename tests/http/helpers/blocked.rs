@@ -1,6 +1,6 @@
 //! Requests that wait for the only worker for longer than they may.
 
-use crate::application::{BOX, TestApplication, expect_problem};
+use crate::application::{BOX, TestApplication, behind_a_proxy, expect_problem};
 use crate::helpers::heavy;
 use crate::helpers::provoke::Operation;
 use crate::operation::metrics::{metrics, value};
@@ -21,7 +21,7 @@ impl Blocked {
             config.workers = Some(1);
             config.work_timeout = Duration::from_millis(20);
             // It is asked for its metrics again and again.
-            config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
+            behind_a_proxy(config);
             // So that the large frame is decoded.
             config.max_frame_memory = 1 << 30;
         });

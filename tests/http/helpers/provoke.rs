@@ -1,6 +1,6 @@
 //! How each problem is provoked: a request that would succeed, with one thing wrong.
 
-use crate::application::{BOX, TestApplication, expect};
+use crate::application::{BOX, TestApplication, behind_a_proxy, expect};
 use crate::helpers::heavy;
 use crate::helpers::raw::RawConnection;
 use crate::operation::metrics::readiness;
@@ -81,7 +81,7 @@ fn settings(slug: &str, config: &mut Config) {
             config.limits.client_requests = Some(1);
             // Of a proxy the streams count, and not the connections.
             config.limits.client_connections = Some(1);
-            config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
+            behind_a_proxy(config);
         }
         "request-too-costly" => {
             config.limits.max_request_pixels = u64::from(pictures::WIDTH * pictures::HEIGHT);

@@ -1,20 +1,18 @@
 //! What one client may have, and that others get their turn beside it.
 
-use crate::application::{BOX, TestApplication, expect, expect_detail, expect_problem};
+use crate::application::{
+    BOX, TestApplication, behind_a_proxy, expect, expect_detail, expect_problem,
+};
 use crate::helpers::heavy;
 use crate::helpers::raw::RawConnection;
 use crate::pictures;
-use bagtrack::http::{Config, Secret};
+use bagtrack::http::Secret;
 use bagtrack_testing::within::within;
 use reqwest::{Method, Response, StatusCode};
 use std::net::{IpAddr, SocketAddr};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 use tokio::task::JoinSet;
-
-fn behind_a_proxy(config: &mut Config) {
-    config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
-}
 
 async fn create_as(app: &TestApplication, client: &str) -> Response {
     let request = app.request(Method::POST, "/sessions", &[("box", BOX)]);

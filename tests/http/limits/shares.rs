@@ -1,6 +1,8 @@
 //! What one client may hold, and that others get theirs beside it.
 
-use crate::application::{BOX, TestApplication, expect, expect_detail, expect_problem};
+use crate::application::{
+    BOX, TestApplication, behind_a_proxy, expect, expect_detail, expect_problem,
+};
 use crate::helpers::heavy;
 use crate::helpers::raw::RawConnection;
 use crate::operation::metrics::{metrics, value};
@@ -15,10 +17,6 @@ use std::time::{Duration, Instant};
 
 const GREEDY: &str = "198.51.100.1";
 const MODEST: &str = "203.0.113.1";
-
-fn behind_a_proxy(config: &mut Config) {
-    config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
-}
 
 /// A request of the client at this address.
 fn request_as(
@@ -179,7 +177,6 @@ async fn the_addresses_of_one_network_hold_half_of_the_memory_for_bodies_and_oth
 /// A service with one key, two sessions of it, and what a page with a token for the first one says.
 async fn beside_a_page(change: fn(&mut Config)) -> (TestApplication, [String; 2], String) {
     let app = TestApplication::start_with(|config| {
-        behind_a_proxy(config);
         behind_a_proxy(config);
         config.access.api_keys = vec![Secret::from("me:0123456789abcdef")];
         change(config);

@@ -1,6 +1,6 @@
 //! What bodies hold while they arrive: memory as far as they have come, and no place in the queue.
 
-use crate::application::{TestApplication, expect, expect_problem};
+use crate::application::{TestApplication, behind_a_proxy, expect, expect_problem};
 use crate::helpers::raw::RawConnection;
 use crate::limits::connections::expect_body_timeouts;
 use crate::pictures;
@@ -13,10 +13,7 @@ use std::time::Duration;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn bodies_that_are_announced_and_never_sent_close_the_service_to_nobody() {
-    let app = TestApplication::start_with(|config| {
-        config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
-    });
-    let app = app.await;
+    let app = TestApplication::start_with(behind_a_proxy).await;
     let id = app.open().await;
     let mut held = Vec::new();
     // More than there are places in the queue, and with more bytes than all uploads may have.

@@ -1,6 +1,6 @@
 //! A request to open a session that is sent again with its `Idempotency-Key`.
 
-use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::application::{BOX, TestApplication, behind_a_proxy, expect, expect_problem};
 use crate::operation::metrics::{metrics, value};
 use crate::pictures;
 use reqwest::multipart::{Form, Part};
@@ -92,7 +92,7 @@ async fn a_stored_answer_is_given_when_there_is_no_room_and_goes_with_its_sessio
 #[tokio::test]
 async fn without_api_keys_each_address_has_keys_of_its_own() {
     let app = TestApplication::start_with(|config| {
-        config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
+        behind_a_proxy(config);
         config.limits.client_sessions = Some(1);
     });
     let app = app.await;

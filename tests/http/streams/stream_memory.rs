@@ -1,6 +1,6 @@
 //! What streams hold while nothing, or a part of a message, comes over them.
 
-use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::application::{BOX, TestApplication, behind_a_proxy, expect, expect_problem};
 use crate::pictures;
 use crate::stream_client::{Received, StreamClient};
 use bagtrack_testing::within::within;
@@ -107,7 +107,7 @@ async fn create_as(app: &TestApplication, client: &str) -> Response {
 #[tokio::test]
 async fn one_client_has_a_share_of_the_streams() {
     let app = TestApplication::start_with(|config| {
-        config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
+        behind_a_proxy(config);
         config.limits.client_connections = Some(2);
     });
     let app = app.await;

@@ -1,6 +1,6 @@
 //! Videos as bodies. Most need ffmpeg.
 
-use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::application::{BOX, TestApplication, behind_a_proxy, expect, expect_problem};
 use crate::helpers::heavy;
 use crate::pictures;
 use crate::program::{Program, serve};
@@ -434,7 +434,7 @@ async fn one_client_has_a_video_at_a_time_and_another_client_gets_the_next_place
     let app = TestApplication::start_with(|config| {
         config.workers = Some(1);
         config.work_timeout = Duration::from_secs(2);
-        config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
+        behind_a_proxy(config);
     });
     let app = app.await;
     let send = async |session: String, client: &str, video: Vec<u8>| {
@@ -476,7 +476,7 @@ async fn readers_that_take_nothing_lose_their_places_to_a_video_that_waits() {
         config.workers = Some(1);
         config.work_timeout = Duration::from_secs(1);
         config.limits.write_timeout = Duration::from_secs(1000);
-        config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
+        behind_a_proxy(config);
     });
     let app = app.await;
     let source = "testsrc2=size=1280x720:rate=30 -frames:v 300 -c:v mpeg4 -q:v 9";

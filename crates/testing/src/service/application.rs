@@ -13,7 +13,11 @@ use tokio::task::JoinHandle;
 /// The box of the target in `pictures::scene(0)`.
 pub const BOX: &str = "20,15,16,12";
 
-/// A running service.
+/// Lets tests name the client of a request in `X-Forwarded-For`.
+pub fn behind_a_proxy(config: &mut Config) {
+    config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
+}
+
 pub struct TestApplication {
     pub address: SocketAddr,
     pub client: Client,
