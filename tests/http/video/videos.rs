@@ -20,18 +20,9 @@ pub const FRAMES: u32 = 12;
 pub fn video(extension: &str) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("video").with_extension(extension);
+    let pictures_in = "-v error -f image2pipe -framerate 25 -c:v png -i pipe:0";
     let mut command = Command::new("ffmpeg");
-    command.args([
-        "-v",
-        "error",
-        "-f",
-        "image2pipe",
-        "-framerate",
-        "25",
-        "-c:v",
-        "png",
-    ]);
-    command.args(["-i", "pipe:0"]);
+    command.args(pictures_in.split(' '));
     if extension != "gif" {
         command.args(["-pix_fmt", "yuv420p", "-b:v", "2M"]);
     }
