@@ -6,7 +6,7 @@ use crate::operation::metrics::readiness;
 use crate::pictures;
 use crate::requests::forms::form;
 use bagtrack_testing::within::within;
-use reqwest::{Method, StatusCode};
+use reqwest::StatusCode;
 use std::time::{Duration, Instant};
 
 /// A box in a frame of 8000 x 5000.
@@ -19,7 +19,7 @@ async fn sixty_four_bombs_of_another_size_hold_no_worker() {
     assert!(bomb.len() < 20_000, "{}", bomb.len());
     let (id, other) = (app.open().await, app.open().await);
     let attack = |id: &str| {
-        let request = app.request(Method::POST, &format!("/sessions/{id}/frames"), &[]);
+        let request = app.frames_request(id, &[]);
         request.multipart(form(vec![bomb.clone(); 64])).send()
     };
     let sent = Instant::now();
@@ -46,7 +46,7 @@ async fn the_size_of_the_last_frame_is_checked_before_the_first_is_decoded() {
     let middle = damaged.len() / 2;
     damaged[middle] ^= 0xFF;
     let form = form([damaged, pictures::png_of(64, 48)]);
-    let request = app.request(Method::POST, &format!("/sessions/{id}/frames"), &[]);
+    let request = app.frames_request(&id, &[]);
     let refused = request.multipart(form).send().await.unwrap();
     let problem = expect_problem(refused, "frame-size-mismatch").await;
     assert_eq!(problem["index"], 1);

@@ -65,9 +65,8 @@ async fn a_body_that_never_ends_is_408_in_every_form() {
 async fn a_body_that_is_too_large_is_413_in_every_form() {
     let app = TestApplication::start_with(|config| config.max_body_bytes = 100_000).await;
     let id = app.open().await;
-    let path = format!("/sessions/{id}/frames");
     let large = || vec![b'A'; 3_000_000];
-    let request = || app.request(Method::POST, &path, &[]);
+    let request = || app.frames_request(&id, &[]);
     let form = form([large()]);
     let text = String::from_utf8(large()).unwrap();
     let endless = futures_util::stream::repeat_with(|| Ok::<_, std::io::Error>(vec![0; 10_000]));

@@ -20,7 +20,7 @@ async fn lines_and_messages_count_as_sent() {
     // Its own answer is the only other one between two of these.
     let own = metrics(&app).await.len();
     let before = sent().await;
-    let request = app.request(Method::POST, &format!("/sessions/{id}/frames"), &[]);
+    let request = app.frames_request(&id, &[]);
     let request = request.header("accept", "application/x-ndjson");
     let answer = request.multipart(frames).send().await.unwrap();
     let lines = answer.text().await.unwrap().len();

@@ -69,9 +69,8 @@ async fn what_the_program_holds_is_compressed_for_clients_that_take_gzip() {
 async fn answers_to_frames_are_never_compressed() {
     let app = TestApplication::start().await;
     let id = app.open().await;
-    let path = format!("/sessions/{id}/frames");
     for accept in ["application/json", "application/x-ndjson", "image/png"] {
-        let request = app.request(Method::POST, &path, &[]);
+        let request = app.frames_request(&id, &[]);
         let request = request
             .header("accept-encoding", "gzip")
             .header("accept", accept);

@@ -285,7 +285,7 @@ async fn json_with_very_many_values_is_refused_before_it_is_parsed() {
         ),
         (format!("{{{}}}", fields.join(",")), "malformed-request"),
     ] {
-        let request = app.request(Method::POST, &format!("/sessions/{id}/frames"), &[]);
+        let request = app.frames_request(&id, &[]);
         let response = request.body(body).send().await.unwrap();
         expect_problem(response, slug).await;
     }
@@ -336,7 +336,7 @@ async fn a_file_that_curl_sent_as_text_is_recognised() {
         .filter(|byte| !b"\0\r\n".contains(byte))
         .collect();
     let send = async |body: Vec<u8>| {
-        let request = app.request(Method::POST, &format!("/sessions/{id}/frames"), &[]);
+        let request = app.frames_request(&id, &[]);
         let request = request.header("content-type", "application/x-www-form-urlencoded");
         request.body(body).send().await.unwrap()
     };

@@ -29,8 +29,7 @@ async fn an_image_that_is_labelled_as_json_is_an_image() {
         }
     }
     let id = app.open().await;
-    let path = format!("/sessions/{id}/frames");
-    let request = app.request(Method::POST, &path, &[]);
+    let request = app.frames_request(&id, &[]);
     let request = request.header("content-type", "application/json");
     let answer = request.body(pictures::png(1)).send().await.unwrap();
     let answer = expect(answer, StatusCode::OK).await;

@@ -4,7 +4,7 @@ use crate::application::{TestApplication, expect, expect_problem};
 use crate::helpers::heavy;
 use crate::pictures;
 use crate::requests::forms::form;
-use reqwest::{Method, Response, StatusCode};
+use reqwest::{Response, StatusCode};
 use serde_json::Value;
 use std::time::Duration;
 
@@ -29,8 +29,7 @@ async fn post(
     query: &[(&str, &str)],
     frames: Vec<Vec<u8>>,
 ) -> Response {
-    let path = format!("/sessions/{id}/frames");
-    let request = app.request(Method::POST, &path, query);
+    let request = app.frames_request(id, query);
     let request = request.header("accept", LINES);
     request.multipart(form(frames)).send().await.unwrap()
 }

@@ -165,7 +165,7 @@ async fn a_parameter_of_the_tracker_is_told_its_place() {
     let by_json = request.send().await.unwrap();
     expect_detail(by_json, "malformed-request", &[&opening]).await;
     let id = app.open().await;
-    let request = app.request(Method::POST, &format!("/sessions/{id}/frames"), &query[1..]);
+    let request = app.frames_request(&id, &query[1..]);
     let frame = request.body(pictures::png(1)).send().await.unwrap();
     expect_detail(frame, "malformed-request", &["when the session is opened"]).await;
 }

@@ -7,7 +7,7 @@ use crate::pictures;
 use bagtrack_testing::within::within;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
-use reqwest::{Method, StatusCode};
+use reqwest::StatusCode;
 use serde_json::json;
 use std::time::Duration;
 
@@ -70,8 +70,7 @@ async fn json_counts_with_the_copies_that_parsing_makes() {
     let mut padded = pictures::png(1);
     padded.resize(45_000, 0);
     let text = BASE64_STANDARD.encode(&padded);
-    let path = format!("/sessions/{id}/frames");
-    let post = || app.request(Method::POST, &path, &[]);
+    let post = || app.frames_request(&id, &[]);
     let response = post().json(&json!({ "frame": text })).send().await.unwrap();
     expect_problem(response, "quota-exceeded").await;
     let response = post().body(padded).send().await.unwrap();

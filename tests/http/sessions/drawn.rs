@@ -9,8 +9,7 @@ use reqwest::{Method, Response, StatusCode};
 use serde_json::Value;
 
 async fn drawn(app: &TestApplication, id: &str, query: &[(&str, &str)], t: u32) -> Response {
-    let path = format!("/sessions/{id}/frames");
-    let request = app.request(Method::POST, &path, query);
+    let request = app.frames_request(id, query);
     let request = request.header("accept", "image/png, */*;q=0.1");
     request.body(pictures::png(t)).send().await.unwrap()
 }
@@ -80,13 +79,11 @@ async fn draw_in_the_query_asks_for_a_picture_too() {
     let app = TestApplication::start().await;
     let id = app.open().await;
     for draw in ["", "true"] {
-        let path = format!("/sessions/{id}/frames");
-        let request = app.request(Method::POST, &path, &[("draw", draw)]);
+        let request = app.frames_request(&id, &[("draw", draw)]);
         let response = request.body(pictures::png(1)).send().await.unwrap();
         picture(response).await;
     }
-    let path = format!("/sessions/{id}/frames");
-    let request = app.request(Method::POST, &path, &[("draw", "false")]);
+    let request = app.frames_request(&id, &[("draw", "false")]);
     let response = request.body(pictures::png(1)).send().await.unwrap();
     assert_eq!(expect(response, StatusCode::OK).await["frame"], 3);
 }

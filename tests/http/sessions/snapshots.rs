@@ -224,17 +224,9 @@ async fn a_forged_length_takes_no_memory_and_is_refused() {
 async fn of_more_stored_answers_than_a_request_may_have_the_last_32_are_kept() {
     let (here, there) = (unsigned(64).await, unsigned(2).await);
     let id = here.open().await;
-    let request = here.request(
-        reqwest::Method::POST,
-        &format!("/sessions/{id}/frames"),
-        &[],
-    );
-    let frames = form((1..=40).map(pictures::png));
-    expect(
-        request.multipart(frames).send().await.unwrap(),
-        StatusCode::OK,
-    )
-    .await;
+    let request = here.frames_request(&id, &[]);
+    let posted = request.multipart(form((1..=40).map(pictures::png)));
+    expect(posted.send().await.unwrap(), StatusCode::OK).await;
     let first = here.post_numbered(&id, 1, pictures::png(1)).await;
     assert_eq!(first.headers()["replayed"], "true");
     let full = here.snapshot(&id).await;

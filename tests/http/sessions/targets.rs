@@ -165,8 +165,7 @@ async fn of_several_frames_all_targets_take_all_or_none() {
     let app = TestApplication::start().await;
     let (id, other) = (open_with(&app, BOXES).await, open_with(&app, BOXES).await);
     let batch = async |frames: [Vec<u8>; 2]| -> Response {
-        let path = format!("/sessions/{id}/frames");
-        let request = app.request(Method::POST, &path, &[("frame", "1")]);
+        let request = app.frames_request(&id, &[("frame", "1")]);
         request.multipart(form(frames)).send().await.unwrap()
     };
     let bad = batch([pictures::png(1), b"no image".to_vec()]).await;

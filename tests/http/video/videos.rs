@@ -64,8 +64,7 @@ pub fn empty_mp4() -> Vec<u8> {
 }
 
 async fn post(app: &TestApplication, id: &str, media_type: &str, video: Vec<u8>) -> Response {
-    let path = format!("/sessions/{id}/frames");
-    let request = app.request(Method::POST, &path, &[]);
+    let request = app.frames_request(id, &[]);
     let request = request.header("content-type", media_type);
     request.body(video).send().await.unwrap()
 }
@@ -108,8 +107,7 @@ async fn a_long_video_that_is_sent_again_goes_on() {
     let (tracked, all) = (3 * u64::from(FRAMES), 4 * u64::from(FRAMES));
     let whole = [&part[..], &rest].concat();
     let send = async |number: &str, video: &[u8]| {
-        let path = format!("/sessions/{id}/frames");
-        let request = app.request(Method::POST, &path, &[("frame", number)]);
+        let request = app.frames_request(&id, &[("frame", number)]);
         let request = request.header("content-type", "video/x-motion-jpeg");
         request.body(video.to_vec()).send().await.unwrap()
     };
@@ -249,11 +247,7 @@ async fn a_session_is_opened_with_a_picture() {
         "{detail}"
     );
     let id = app.open().await;
-    let request = app.request(
-        Method::POST,
-        &format!("/sessions/{id}/frames"),
-        &[("draw", "")],
-    );
+    let request = app.frames_request(&id, &[("draw", "")]);
     let drawn = request.body(gif).send().await.unwrap();
     expect_problem(drawn, "malformed-request").await;
 }

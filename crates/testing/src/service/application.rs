@@ -111,18 +111,20 @@ impl TestApplication {
         created["id"].as_str().unwrap().to_owned()
     }
 
-    /// `POST /sessions/{id}/frames` with a raw body.
+    /// `POST /sessions/{id}/frames`, without a body so far.
+    pub fn frames_request(&self, id: &str, query: &[(&str, &str)]) -> RequestBuilder {
+        self.request(Method::POST, &format!("/sessions/{id}/frames"), query)
+    }
+
     pub async fn post_frame(&self, id: &str, frame: Vec<u8>) -> Response {
-        let path = format!("/sessions/{id}/frames");
-        let request = self.request(Method::POST, &path, &[]);
+        let request = self.frames_request(id, &[]);
         request.body(frame).send().await.unwrap()
     }
 
     /// `POST /sessions/{id}/frames?frame=N` with a raw body.
     pub async fn post_numbered(&self, id: &str, number: u64, frame: Vec<u8>) -> Response {
-        let path = format!("/sessions/{id}/frames");
         let number = number.to_string();
-        let request = self.request(Method::POST, &path, &[("frame", &number)]);
+        let request = self.frames_request(id, &[("frame", &number)]);
         request.body(frame).send().await.unwrap()
     }
 
