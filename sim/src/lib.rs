@@ -3,40 +3,40 @@
 //!
 //! | who | what is real | what is simulated |
 //! |---|---|---|
-//! | [callers](caller) | the client `bagtrack-client` with its rules (docs/PROTOCOL.md) | what they want, and their patience |
+//! | callers (`caller`) | the client `bagtrack-client`, its rules (docs/PROTOCOL.md) | what they want, and their patience |
 //! | streams | HTTP/1.1 and WebSockets, both ends | the caller's rules: those of a camera |
-//! | [the network](network) | requests and answers as HTTP has them | lines that lose, delay, double and break |
-//! | [replicas](replica) | routes, acts, store, scheduler, tracker | sockets, threads, processor time |
-//! | [the store](redis) | its Lua scripts | the server: keys, times to live, and whether it is there |
-//! | [the nemesis](nemesis) | | kills, drains, restarts, clocks that jump |
+//! | the network (`network`) | requests and answers as HTTP has them | lines that lose, delay, double and break |
+//! | replicas (`replica`) | routes, acts, store, scheduler, tracker | sockets, threads, processor time |
+//! | the store (`redis`) | its Lua scripts | the server: keys, times to live, and whether it is there |
+//! | the nemesis (`nemesis`) | | kills, drains, restarts, clocks that jump |
 //!
-//! After each run [`journal`], [`caller`] and [`checks`] have compared what was promised with what happened: every
-//! answer is that of the [tracker alone](replay), no number is answered with two boxes, nothing is answered that the
+//! After each run `journal`, `caller` and `checks` have compared what was promised with what happened: every
+//! answer is that of the tracker alone (`replay`), no number is answered with two boxes, nothing is answered that the
 //! store does not have, every session goes on until its caller ends it or it expires, and nothing is held in the end.
 //!
 //! The same seed does the same again, since one thread runs all tasks in order; the time is tokio's, paused; and all
 //! random numbers are drawn from the seed, those of the service by `bagtrack_sessions::random`. Work takes simulated time
 //! only: what the scheduler does with measured times is left to its own tests.
 
-pub mod caller;
-pub mod chance;
-pub mod checks;
-pub mod cluster;
-pub mod faults;
-pub mod journal;
-pub mod life;
+mod caller;
+mod chance;
+mod checks;
+mod cluster;
+mod faults;
+mod journal;
+mod life;
 mod line;
-pub mod nemesis;
-pub mod network;
+mod nemesis;
+mod network;
 #[cfg(feature = "planted-faults")]
 mod planted;
-pub mod redis;
-pub mod replay;
-pub mod replica;
-pub mod scenes;
+mod redis;
+mod replay;
+mod replica;
+mod scenes;
 mod streamer;
-pub mod trace;
-pub mod world;
+mod trace;
+mod world;
 
 #[cfg(feature = "planted-faults")]
 pub use planted::finds;
