@@ -1,7 +1,8 @@
-//! What answers look like to people.
+//! What answers look like to people, and which version gives them.
 
-use crate::application::{BOX, TestApplication, expect};
+use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::pictures;
+use bagtrack::http::Secret;
 use reqwest::{Method, StatusCode};
 use serde_json::Value;
 
@@ -83,4 +84,17 @@ async fn the_parameters_are_named_when_that_is_asked_for() {
         .create(pictures::png(0), &[("box", BOX), ("verbose", "very")])
         .await;
     assert_eq!(refused.status(), StatusCode::BAD_REQUEST);
+}
+
+#[tokio::test]
+async fn the_version_is_told_to_everybody() {
+    let app = TestApplication::start_with(|config| {
+        config.access.api_keys = vec![Secret::from("me:0123456789abcdef")];
+    });
+    let mut app = app.await;
+    app.key = None;
+    let version = expect(app.get("/version").await, StatusCode::OK).await;
+    assert_eq!(version["name"], "bagtrack");
+    assert_eq!(version["version"], env!("CARGO_PKG_VERSION"));
+    expect_problem(app.get("/version?of=all").await, "malformed-request").await;
 }

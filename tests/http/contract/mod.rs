@@ -6,4 +6,3 @@ pub mod openapi_examples;
 pub mod page;
 pub mod problem_page;
 pub mod problems;
-pub mod version;

@@ -7,9 +7,11 @@ use crate::program::{self, Program};
 use crate::requests::forms::form;
 use bagtrack_testing::within::within;
 use image::ImageFormat;
+use reqwest::{Client, StatusCode};
 use rustix::process::Signal;
 use serde_json::Value;
 use std::process::{Command, Output};
+use std::time::SystemTime;
 
 fn bagtrack() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
@@ -102,7 +104,7 @@ async fn a_log_that_nobody_reads_stops_nothing_and_its_lost_lines_are_counted() 
 
     // From here on the pipe is open and nobody reads it. Each of these requests has two lines in the log, together
     // many times what the pipe and the service keep.
-    let client = reqwest::Client::new();
+    let client = Client::new();
     let nowhere = service.url("/nowhere");
     let all = async {
         for _ in 0..REQUESTS / 10 {
@@ -190,4 +192,21 @@ fn too_few_open_files_are_said_at_the_start_and_the_service_answers() {
     assert!(bound.starts_with("resident memory stays below "), "{bound}");
     assert_eq!(silent.len(), 300);
     assert!(healthy.status.success(), "{healthy:?}");
+}
+
+#[tokio::test]
+async fn a_host_name_and_bare_seconds_are_taken() {
+    let times = ["--session-idle", "10", "--session-first", "10"];
+    let flags = [&["--listen", "localhost:0"], &times[..]].concat();
+    let service = Program::start(&flags, &[]);
+    assert!(service.address.ip().is_loopback());
+    let request = Client::new().post(service.url(&format!("/sessions?box={BOX}")));
+    let created = request.body(pictures::png(0)).send().await.unwrap();
+    assert_eq!(created.status(), StatusCode::CREATED);
+    let created: Value = created.json().await.unwrap();
+    let expires = humantime::parse_rfc3339(created["expires_at"].as_str().unwrap()).unwrap();
+    let left = expires
+        .duration_since(SystemTime::now())
+        .map_or(0, |left| left.as_secs());
+    assert!(left <= 10, "{left} s");
 }

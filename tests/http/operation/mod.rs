@@ -9,4 +9,3 @@ pub mod export;
 pub mod log;
 pub mod metrics;
 pub mod process;
-pub mod short_flags;
