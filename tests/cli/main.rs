@@ -1,6 +1,8 @@
 //! The command line, as a person types it.
 
 mod curl_session;
+mod cut_video;
+mod drawn_video;
 mod help;
 mod sample_track;
 mod serve;

@@ -1,4 +1,4 @@
-//! `bagtrack track` on a video, and videos that it draws. Most need ffmpeg.
+//! `bagtrack track` on a video: where it starts, and when its frames are shown. Most need ffmpeg.
 
 use crate::command::{
     about, bagtrack, boxes, clip, fails, folder, probe, rows, succeeds, text, video_of,
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// A small clip, and the flag for its first box.
-fn small_clip(parent: &Path, name: &str, [width, height]: [&str; 2]) -> (PathBuf, String) {
+pub fn small_clip(parent: &Path, name: &str, [width, height]: [&str; 2]) -> (PathBuf, String) {
     let dir = clip(parent, name, &["--width", width, "--height", height]);
     let truth = fs::read_to_string(dir.join("groundtruth_rect.txt")).expect("it is there");
     let [x, y, width, height] = boxes(&truth)[0];
@@ -50,68 +50,6 @@ fn a_video_gets_the_boxes_of_its_frames_and_a_drawn_video_has_all_of_them() {
     assert!(pictures.join("000011.jpg").is_file());
 }
 
-#[test]
-#[ignore = "needs ffmpeg"]
-fn each_ending_that_is_offered_becomes_a_video_of_this_kind() {
-    let parent = folder();
-    // Odd sides are made even where the encoder wants that.
-    let (dir, target) = small_clip(parent.path(), "odd", ["161", "121"]);
-    for (ending, kind, size) in [
-        ("mp4", "mp4", "162,122"),
-        ("m4v", "mp4", "162,122"),
-        ("mov", "mov", "162,122"),
-        ("mkv", "matroska", "162,122"),
-        ("webm", "webm", "162,122"),
-        ("avi", "avi", "162,122"),
-        ("gif", "gif", "161,121"),
-    ] {
-        let video = parent.path().join(format!("drawn.{ending}"));
-        let printed = succeeds(&["track", text(&dir), &target, "--draw", text(&video)]);
-        assert_eq!(printed.lines().count(), 13, "{ending}: {printed}");
-        assert_eq!(about(&video), format!("{size},25/1,12"), "{ending}");
-        let format = probe(&video, "-show_entries format=format_name");
-        assert!(format.contains(kind), "{ending}: {format}");
-    }
-}
-
-#[test]
-fn what_cannot_be_drawn_is_told_before_the_first_row_and_leaves_nothing() {
-    let parent = folder();
-    let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
-    let there = parent.path().join("there.mp4");
-    fs::write(&there, "mine").expect("the folder is writable");
-    for (name, said) in [
-        (
-            "out.xyz",
-            "it can write a video (.mp4, .m4v, .mov, .mkv, .webm, .avi, .gif), or a folder",
-        ),
-        ("out.jpg", "or a folder of JPEG files, as"),
-        ("nowhere/out.mp4", "there is no folder"),
-        ("there.mp4", "it is there"),
-    ] {
-        let out = parent.path().join(name);
-        let output = bagtrack(&["track", text(&dir), &target, "--draw", text(&out)]);
-        let errors = String::from_utf8(output.stderr).expect("text");
-        assert_eq!(output.status.code(), Some(1), "{name}");
-        assert!(output.stdout.is_empty(), "{name}: rows before {errors}");
-        assert!(errors.contains(said), "{name}: {errors}");
-        assert_eq!(errors.lines().count(), 1, "{errors}");
-    }
-    assert_eq!(fs::read(&there).expect("it is there"), b"mine");
-    let left = fs::read_dir(parent.path()).expect("it is there").count();
-    assert_eq!(left, 2, "the clip and the file that was there");
-}
-
-#[test]
-fn a_name_with_a_slash_at_its_end_is_a_folder_whatever_its_ending() {
-    let parent = folder();
-    let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
-    let out = parent.path().join("out.avi");
-    let slash = format!("{}/", text(&out));
-    succeeds(&["track", text(&dir), &target, "--draw", &slash]);
-    assert_eq!(fs::read_dir(&out).expect("a folder").count(), 12);
-}
-
 /// There was "No such file or directory".
 #[test]
 fn standard_input_and_addresses_are_told_as_no_files() {
@@ -119,38 +57,6 @@ fn standard_input_and_addresses_are_told_as_no_files() {
         let line = fails(&["track", source, "--box=10,20,30,40"]);
         assert!(line.contains("save the video to a file first"), "{line}");
     }
-}
-
-#[cfg(unix)]
-#[test]
-#[ignore = "needs ffmpeg"]
-fn an_encoder_that_this_ffmpeg_does_not_have_is_told_before_the_first_row() {
-    use std::os::unix::fs::PermissionsExt;
-    let parent = folder();
-    let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
-    let programs = parent.path().join("programs");
-    fs::create_dir(&programs).expect("the folder is writable");
-    let program = programs.join("ffmpeg");
-    // The real one, which is told to take an encoder that it does not have.
-    let path = std::env::var("PATH").expect("it is set");
-    let encode = "-f mjpeg -i pipe:0 -c:v nothing";
-    let script = format!(
-        "#!/bin/sh\nPATH='{path}'\nfor last; do :; done\nexec ffmpeg -v error {encode} \"$last\"\n"
-    );
-    fs::write(&program, script).expect("the folder is writable");
-    let executable = fs::Permissions::from_mode(0o755);
-    fs::set_permissions(&program, executable).expect("it is ours");
-    let out = parent.path().join("out.webm");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
-    command.args(["track", text(&dir), &target, "--draw", text(&out)]);
-    let output = command.env("PATH", &programs).output().expect("it starts");
-    let errors = String::from_utf8(output.stderr).expect("text");
-    assert_eq!(output.status.code(), Some(1));
-    assert!(output.stdout.is_empty(), "rows before {errors}");
-    let told =
-        errors.contains("out.webm: this ffmpeg cannot write it") && errors.contains("nothing");
-    assert!(told, "{errors}");
-    assert!(!out.exists());
 }
 
 #[test]
@@ -293,51 +199,8 @@ fn the_start_is_exactly_the_frame_that_is_named_in_each_kind_of_file() {
     }
 }
 
-/// Where such a video is cut, its first packets are of pictures that are made from ones before the cut. They were counted.
-#[test]
-#[ignore = "needs ffmpeg"]
-fn pictures_that_cannot_be_made_after_a_cut_have_no_numbers() {
-    let parent = folder();
-    let cut = parent.path().join("cut.mkv");
-    let source = "color=size=96x64:rate=30:duration=2,geq=lum='20+3*N+25*mod(floor(X/8)+floor(Y/8)\\,2)':cb=128:cr=128";
-    let coded = "log-level=none:open-gop=1:keyint=15:min-keyint=15:bframes=4:b-adapt=0";
-    let coded = format!("-c:v libx265 -x265-params {coded} whole.mkv");
-    ffmpeg_in(parent.path(), &format!("-f lavfi -i {source} {coded}"));
-    ffmpeg_in(parent.path(), "-ss 0.8 -i whole.mkv -c copy cut.mkv");
-    let track = |start: usize| {
-        let out = format!("{}/", text(&parent.path().join(start.to_string())));
-        let start_at = start.to_string();
-        let flags = ["--box=30,20,24,24", "--start", &start_at, "--format", "csv"];
-        let printed = succeeds(&[&["track", text(&cut)], &flags[..], &["--draw", &out]].concat());
-        let rows = rows(&printed).into_iter();
-        let times: Vec<f64> = rows.map(|row| row.time.expect("it has a time")).collect();
-        let first = image::open(Path::new(&out).join(format!("{start:06}.jpg")));
-        (times, first.expect("it was drawn").into_luma8())
-    };
-    let (times, _) = track(0);
-    assert!(times.len() > 30, "{times:?}");
-    for (index, pair) in times.windows(2).enumerate() {
-        assert!(
-            (pair[1] - pair[0] - 1.0 / 30.0).abs() < 2e-3,
-            "{index}: {times:?}"
-        );
-    }
-    for start in [1, 12] {
-        let (later, picture) = track(start);
-        assert_eq!(later, times[start..]);
-        let of_whole = parent.path().join(format!("0/{start:06}.jpg"));
-        let of_whole = image::open(of_whole).expect("it was drawn").into_luma8();
-        // Squares of the ground, away from the box: a frame is 3 gray levels lighter than the one before.
-        let gray = |picture: &image::GrayImage| f64::from(picture.get_pixel(68, 60).0[0]);
-        assert!((gray(&picture) - gray(&of_whole)).abs() < 1.7, "{start}");
-    }
-    let beyond = times.len().to_string();
-    let line = fails(&["track", text(&cut), "--box=30,20,24,24", "--start", &beyond]);
-    assert!(line.contains(&format!("it has {beyond} frames")), "{line}");
-}
-
 /// Runs ffmpeg in a folder.
-fn ffmpeg_in(folder: &Path, arguments: &str) {
+pub fn ffmpeg_in(folder: &Path, arguments: &str) {
     let mut command = Command::new("ffmpeg");
     let command = command.args(["-v", "error"]).current_dir(folder);
     let command = command.args(arguments.split(' '));
@@ -347,10 +210,10 @@ fn ffmpeg_in(folder: &Path, arguments: &str) {
     );
 }
 
-const TEST_PICTURES: &str = "-f lavfi -i testsrc2=size=160x120:rate=30";
+pub const TEST_PICTURES: &str = "-f lavfi -i testsrc2=size=160x120:rate=30";
 
 /// The times of the rows of a video, from a frame on, and the line that tells why there are no more.
-fn times_and_end(video: &Path, start: &str) -> (Vec<f64>, String) {
+pub fn times_and_end(video: &Path, start: &str) -> (Vec<f64>, String) {
     let flags = ["--box=50,40,30,30", "--format", "csv", "--start", start];
     let output = bagtrack(&[&["track", text(video)], &flags[..]].concat());
     let printed = String::from_utf8(output.stdout).expect("text");
@@ -362,94 +225,6 @@ fn times_and_end(video: &Path, start: &str) -> (Vec<f64>, String) {
     let times = rows.iter().map(|row| row.time.expect("it has a time"));
     let errors = String::from_utf8(output.stderr).expect("text");
     (times.collect(), errors)
-}
-
-/// Whether these are all the times at 30 a second from the first one on.
-fn are_even(times: &[f64]) -> bool {
-    let mut pairs = times.windows(2);
-    pairs.all(|pair| (pair[1] - pair[0] - 1.0 / 30.0).abs() < 2e-3)
-}
-
-/// Packets of pictures that others alone are made from had a number each and a time, and all after them were late.
-#[test]
-#[ignore = "needs ffmpeg"]
-fn pictures_of_vp8_that_are_not_shown_have_no_numbers() {
-    let parent = folder();
-    let coded = "-frames:v 90 -c:v libvpx -b:v 300k -auto-alt-ref 1 -lag-in-frames 25";
-    for pass in [1, 2] {
-        let arguments = format!("{TEST_PICTURES} {coded} -y -pass {pass} vp8.webm");
-        ffmpeg_in(parent.path(), &arguments);
-    }
-    for start in [0, 60] {
-        let video = parent.path().join("vp8.webm");
-        let (times, end) = times_and_end(&video, &start.to_string());
-        assert_eq!((times.len(), end.as_str()), (90 - start, ""));
-        assert!(are_even(&times), "{times:?}");
-        assert!((times[0] - start as f64 / 30.0).abs() < 2e-3, "{times:?}");
-    }
-}
-
-/// Each of these had no row, or had not all that can be had.
-#[test]
-#[ignore = "needs ffmpeg"]
-fn what_is_no_damage_of_a_picture_ends_no_video() {
-    let parent = folder();
-    let make = |arguments: &str| ffmpeg_in(parent.path(), arguments);
-    let video = |name: &str| parent.path().join(name);
-    let coded = "-f lavfi -i sine -frames:v 30 -c:v libx264 -c:a aac -shortest whole.mp4";
-    make(&format!("{TEST_PICTURES} {coded}"));
-    // Sound is not decoded.
-    make("-i whole.mp4 -c copy -bsf:a noise=amount=5 noisy.mp4");
-    let (times, end) = times_and_end(&video("noisy.mp4"), "0");
-    assert_eq!((times.len(), end.as_str()), (30, ""));
-    // The end is missing, which ffmpeg says as soon as it looks for the index.
-    make("-i whole.mp4 -an -c:v libvpx-vp9 -cpu-used 8 whole.webm");
-    let bytes = fs::read(video("whole.webm")).expect("it was made");
-    fs::write(video("cut.webm"), &bytes[..bytes.len() * 8 / 10]).expect("it is writable");
-    let (all, end) = times_and_end(&video("cut.webm"), "0");
-    assert!((15..30).contains(&all.len()), "{all:?}");
-    assert!(end.contains("File ended prematurely"), "{end}");
-    let (later, end) = times_and_end(&video("cut.webm"), "5");
-    assert_eq!(later, all[5..]);
-    assert!(end.contains("File ended prematurely"), "{end}");
-    // Two pictures have the same time.
-    let twice = r"setts=ts=if(eq(N\,9)\,PREV_OUTPTS\,TS)";
-    make(&format!("-i whole.webm -c copy -bsf:v {twice} twice.webm"));
-    let (times, end) = times_and_end(&video("twice.webm"), "0");
-    assert_eq!((times.len(), end.as_str()), (30, ""));
-    assert_eq!(times[8], times[9]);
-}
-
-/// Of a broadcast that is received from some moment on, the first pictures cannot be made. Nothing was tracked.
-#[test]
-#[ignore = "needs ffmpeg"]
-fn a_recording_that_begins_between_key_pictures_is_tracked_from_the_next_one_on() {
-    let parent = folder();
-    for coded in [
-        "libx264 -bf 2",
-        "libx265 -x265-params log-level=none",
-        "mpeg2video -q:v 4",
-    ] {
-        let name = coded.split(' ').next().expect("the encoder");
-        let coded = format!("-frames:v 90 -c:v {coded} -g 30 {name}.ts");
-        ffmpeg_in(parent.path(), &format!("{TEST_PICTURES} {coded}"));
-        let (whole, cut) = (
-            format!("{name}.ts"),
-            parent.path().join(format!("cut-{name}.ts")),
-        );
-        let bytes = fs::read(parent.path().join(whole)).expect("it was made");
-        let packets = bytes.len() / 188;
-        fs::write(&cut, &bytes[packets / 6 * 188..]).expect("it is writable");
-        let (all, end) = times_and_end(&cut, "0");
-        assert_eq!(end, "", "{name}");
-        // Beside the first key picture some cannot be made, either.
-        assert!(
-            (58..90).contains(&all.len()) && are_even(&all[3..]),
-            "{name}: {all:?}"
-        );
-        let (later, end) = times_and_end(&cut, "20");
-        assert_eq!((later.as_slice(), end.as_str()), (&all[20..], ""), "{name}");
-    }
 }
 
 /// Its length is not known beforehand. A reader of the file took the last box for that of all frames to the end.
@@ -468,52 +243,6 @@ fn a_track_ends_in_cvat_where_the_video_goes_on_without_known_times() {
             ends,
             "{count}: {printed}"
         );
-    }
-}
-
-#[test]
-fn a_folder_has_no_frames_that_are_hidden_and_draws_each_of_the_others() {
-    let parent = folder();
-    let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
-    let frames = parent.path().join("frames");
-    fs::create_dir(&frames).expect("the folder is writable");
-    let first = dir.join("img/0001.jpg");
-    let picture = image::open(&first).expect("it is a picture");
-    fs::copy(&first, frames.join("a.jpg")).expect("it is there");
-    picture.save(frames.join("a.png")).expect("it is writable");
-    fs::write(frames.join("._a.jpg"), "of macOS").expect("it is writable");
-    let drawn = format!("{}/", text(&parent.path().join("drawn")));
-    let printed = succeeds(&[
-        "track",
-        text(&frames),
-        &target,
-        "--format",
-        "csv",
-        "--draw",
-        &drawn,
-    ]);
-    assert_eq!(rows(&printed).len(), 2);
-    let mut names: Vec<_> = fs::read_dir(&drawn).expect("it is there").collect();
-    names.sort_by_key(|entry| entry.as_ref().expect("it is there").file_name());
-    let names = names
-        .into_iter()
-        .map(|entry| entry.expect("it is there").file_name());
-    assert_eq!(names.collect::<Vec<_>>(), ["a.jpg", "a.png.jpg"]);
-}
-
-/// The pixels of DV, of DVDs and of many cameras are no squares. What was drawn was shown too narrow.
-#[test]
-#[ignore = "needs ffmpeg"]
-fn a_drawn_video_has_pixels_of_the_shape_of_the_source() {
-    let parent = folder();
-    let coded = "-frames:v 9 -vf setsar=16/11 -c:v libx264 wide.mp4";
-    ffmpeg_in(parent.path(), &format!("{TEST_PICTURES} {coded}"));
-    for name in ["drawn.mp4", "drawn.mkv"] {
-        let (source, drawn) = (parent.path().join("wide.mp4"), parent.path().join(name));
-        let flags = ["--box=50,40,30,30", "--draw", text(&drawn)];
-        succeeds(&[&["track", text(&source)], &flags[..]].concat());
-        let told = probe(&drawn, "-show_entries stream=sample_aspect_ratio");
-        assert_eq!(told, "16:11", "{name}");
     }
 }
 
@@ -566,24 +295,6 @@ fn a_trimmed_video_is_followed_from_its_last_frame_on() {
             "{start}"
         );
     }
-}
-
-/// Players show a picture for a tenth of a second where it has less than two hundredths.
-#[test]
-#[ignore = "needs ffmpeg"]
-fn a_gif_of_a_fast_video_lasts_as_long_as_the_video() {
-    let parent = folder();
-    let source = TEST_PICTURES.replace("rate=30", "rate=60");
-    ffmpeg_in(parent.path(), &format!("{source} -frames:v 30 fast.mp4"));
-    let (video, drawn) = (
-        parent.path().join("fast.mp4"),
-        parent.path().join("fast.gif"),
-    );
-    let flags = ["--box=50,40,30,30", "--draw", text(&drawn)];
-    succeeds(&[&["track", text(&video)], &flags[..]].concat());
-    let times = shown_at(&drawn);
-    assert_eq!(times.len(), 15, "{times:?}");
-    assert!((times[14] - 28.0 / 60.0).abs() < 0.02, "{times:?}");
 }
 
 #[test]
@@ -694,7 +405,7 @@ fn times_are_those_of_the_video_also_where_its_rate_changes() {
 }
 
 /// When each frame of a video is shown, in seconds.
-fn shown_at(video: &Path) -> Vec<f64> {
+pub fn shown_at(video: &Path) -> Vec<f64> {
     let told = probe(video, "-select_streams v:0 -show_entries frame=pts_time");
     let times = told.lines().map(|line| line.trim_end_matches(','));
     // Some frames have a line of their own for what stands beside them.
