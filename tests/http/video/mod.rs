@@ -1,5 +1,6 @@
-//! Whole videos: tracked, propagated between key frames, and against what was annotated.
+//! Whole videos: decoded, tracked, propagated between key frames, and against what was annotated.
 
+pub mod decoder;
 pub mod footage;
 pub mod propagation;
 pub mod track_video;

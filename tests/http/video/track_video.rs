@@ -2,9 +2,9 @@
 
 use crate::application::{BOX, TestApplication, expect_problem};
 use crate::helpers::heavy;
+use crate::helpers::video_files::{FRAMES, empty_mp4, motion_jpeg, video};
 use crate::operation::metrics::{metrics, value};
 use crate::requests::lines::{LINES, lines};
-use crate::video::videos::{FRAMES, empty_mp4, motion_jpeg, video};
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, Response, StatusCode};
 use serde_json::Value;

@@ -2,66 +2,16 @@
 
 use crate::application::{BOX, TestApplication, behind_a_proxy, expect, expect_problem};
 use crate::helpers::heavy;
+use crate::helpers::video_files::{FRAMES, empty_mp4, made, motion_jpeg, pattern, video};
 use crate::pictures;
-use crate::program::{Program, serve};
 use crate::requests::lines::lines;
 use bagtrack_sessions::KEPT_ANSWERS;
 use bagtrack_testing::within::within;
 use futures_util::future::join_all;
 use image::ImageFormat;
-use reqwest::{Client, Method, Response};
-use std::io::Write;
-use std::process::{Command, Stdio};
+use reqwest::{Method, Response};
+use std::process::Command;
 use std::time::Duration;
-
-pub const FRAMES: u32 = 12;
-
-/// The drawn frames 1 to [`FRAMES`] as a video of this kind.
-pub fn video(extension: &str) -> Vec<u8> {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("video").with_extension(extension);
-    let pictures_in = "-v error -f image2pipe -framerate 25 -c:v png -i pipe:0";
-    let mut command = Command::new("ffmpeg");
-    command.args(pictures_in.split(' '));
-    if extension != "gif" {
-        command.args(["-pix_fmt", "yuv420p", "-b:v", "2M"]);
-    }
-    let mut child = command.arg(&file).stdin(Stdio::piped()).spawn().unwrap();
-    let mut input = child.stdin.take().unwrap();
-    for t in 1..=FRAMES {
-        input.write_all(&pictures::png(t)).unwrap();
-    }
-    drop(input);
-    assert!(child.wait().unwrap().success(), "{extension}");
-    std::fs::read(file).unwrap()
-}
-
-/// A file that ffmpeg makes of these arguments.
-fn made(name: &str, arguments: &str) -> Vec<u8> {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join(name);
-    let mut command = Command::new("ffmpeg");
-    command.args(["-v", "error", "-f", "lavfi", "-i"]);
-    command.args(arguments.split(' ')).arg(&file);
-    assert!(command.status().unwrap().success(), "{arguments}");
-    std::fs::read(file).unwrap()
-}
-
-/// So many pictures of ffmpeg's own test pattern, 320 by 240 pixels, as a video of this kind, with further arguments.
-fn pattern(extension: &str, pictures: u32, arguments: &str) -> Vec<u8> {
-    let source = format!("testsrc2=size=320x240:rate=30 {arguments}-frames:v {pictures} -b:v 2M");
-    made(&format!("pattern.{extension}"), &source)
-}
-
-pub fn motion_jpeg() -> Vec<u8> {
-    let frames = (1..=FRAMES).map(|t| pictures::encode(pictures::scene(t), ImageFormat::Jpeg));
-    frames.flatten().collect()
-}
-
-/// What begins as an MP4 file does, and has nothing in it.
-pub fn empty_mp4() -> Vec<u8> {
-    [b"\0\0\0\x18ftypmp42".to_vec(), vec![0; 400]].concat()
-}
 
 async fn post(app: &TestApplication, id: &str, media_type: &str, video: Vec<u8>) -> Response {
     let request = app.frames_request(id, &[]);
@@ -538,81 +488,4 @@ async fn damage_in_the_middle_of_a_video_is_told_and_nothing_after_it_is_numbere
         .iter_mut()
         .for_each(|byte| *byte ^= 0x5A);
     assert!(until_damage(&app, noise).await < FRAMES as usize);
-}
-
-#[cfg(target_os = "linux")]
-#[test]
-fn the_decoder_of_the_program_may_read_no_other_file_and_open_no_socket() {
-    let program = env!("CARGO_BIN_EXE_bagtrack");
-    let service = Program::start(&[], &[]);
-    let mut said = service.said().iter();
-    if said.any(|line| line.contains("Landlock or seccomp is not to be had")) {
-        return eprintln!("left out: this kernel has no Landlock or no seccomp");
-    }
-    let run = |command: &[&str]| {
-        let mut confined = Command::new(program);
-        let output = confined.arg("confined").args(command).output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        (output.status.code(), said)
-    };
-    assert_eq!(run(&["true"]).0, Some(0));
-    let (code, said) = run(&["cat", concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml")]);
-    assert!(
-        code == Some(1) && said.contains("Permission denied"),
-        "{said}"
-    );
-    // Nor does it read or write where all may.
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("file");
-    std::fs::write(&file, "text").unwrap();
-    let (code, said) = run(&["cat", file.to_str().unwrap()]);
-    assert!(
-        code == Some(1) && said.contains("Permission denied"),
-        "{said}"
-    );
-    let (code, said) = run(&["touch", folder.path().join("other").to_str().unwrap()]);
-    assert!(
-        code == Some(1) && said.contains("Permission denied"),
-        "{said}"
-    );
-    let (_, said) = run(&["bash", "-c", "exec 3<>/dev/tcp/127.0.0.1/9"]);
-    assert!(said.contains("Operation not permitted"), "{said}");
-    assert_eq!(run(&["/nowhere/ffmpeg"]).0, Some(127));
-}
-
-/// After an upgrade another file has its name. A video was refused, or what had the name was started.
-#[tokio::test]
-#[ignore = "needs ffmpeg"]
-async fn a_program_whose_file_was_removed_decodes_videos() {
-    let folder = tempfile::tempdir().unwrap();
-    let own = folder.path().join("bagtrack");
-    // A process of its own: where this one wrote the file, one that another test begins meanwhile would hold it open.
-    let program = bagtrack_testing::command::program("bagtrack");
-    let copied = Command::new("cp").arg(program).arg(&own).status();
-    assert!(copied.unwrap().success());
-    let (service, client) = (Program::spawn(&mut serve(&own)).unwrap(), Client::new());
-    std::fs::remove_file(&own).unwrap();
-    let url = service.url(&format!("/track?box={BOX}"));
-    let answer = client.post(url).body(video("mp4")).send().await.unwrap();
-    assert_eq!(answer.status(), 200);
-    assert_eq!(lines(answer).await.len(), FRAMES as usize);
-}
-
-#[tokio::test]
-#[ignore = "needs ffmpeg"]
-async fn the_program_decodes_a_video_with_few_rights_and_without_ffmpeg_says_so() {
-    for (program, status) in [("ffmpeg", 200), ("/nowhere/ffmpeg", 415)] {
-        let (service, client) = (Program::start(&["--ffmpeg", program], &[]), Client::new());
-        let create = client.post(service.url(&format!("/sessions?box={BOX}")));
-        let created = create.body(pictures::png(0)).send().await.unwrap();
-        let created = expect(created, reqwest::StatusCode::CREATED).await;
-        let url = format!("/sessions/{}/frames", created["id"].as_str().unwrap());
-        // Its index is at the end, so the decoder goes back in it.
-        let post = client.post(service.url(&url)).body(video("mp4"));
-        let answer = post.send().await.unwrap();
-        assert_eq!(answer.status(), status);
-        if status == 200 {
-            assert_eq!(lines(answer).await.len(), FRAMES as usize);
-        }
-    }
 }

@@ -1,0 +1,86 @@
+//! The process that decodes videos: what it may do, and where it is found.
+
+use crate::application::{BOX, expect};
+use crate::helpers::video_files::{FRAMES, video};
+use crate::pictures;
+use crate::program::{Program, serve};
+use crate::requests::lines::lines;
+use reqwest::Client;
+use std::process::Command;
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_decoder_of_the_program_may_read_no_other_file_and_open_no_socket() {
+    let program = env!("CARGO_BIN_EXE_bagtrack");
+    let service = Program::start(&[], &[]);
+    let mut said = service.said().iter();
+    if said.any(|line| line.contains("Landlock or seccomp is not to be had")) {
+        return eprintln!("left out: this kernel has no Landlock or no seccomp");
+    }
+    let run = |command: &[&str]| {
+        let mut confined = Command::new(program);
+        let output = confined.arg("confined").args(command).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code(), said)
+    };
+    assert_eq!(run(&["true"]).0, Some(0));
+    let (code, said) = run(&["cat", concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml")]);
+    assert!(
+        code == Some(1) && said.contains("Permission denied"),
+        "{said}"
+    );
+    // Nor does it read or write where all may.
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    std::fs::write(&file, "text").unwrap();
+    let (code, said) = run(&["cat", file.to_str().unwrap()]);
+    assert!(
+        code == Some(1) && said.contains("Permission denied"),
+        "{said}"
+    );
+    let (code, said) = run(&["touch", folder.path().join("other").to_str().unwrap()]);
+    assert!(
+        code == Some(1) && said.contains("Permission denied"),
+        "{said}"
+    );
+    let (_, said) = run(&["bash", "-c", "exec 3<>/dev/tcp/127.0.0.1/9"]);
+    assert!(said.contains("Operation not permitted"), "{said}");
+    assert_eq!(run(&["/nowhere/ffmpeg"]).0, Some(127));
+}
+
+/// After an upgrade another file has its name. A video was refused, or what had the name was started.
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn a_program_whose_file_was_removed_decodes_videos() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = folder.path().join("bagtrack");
+    // A process of its own: where this one wrote the file, one that another test begins meanwhile would hold it open.
+    let program = bagtrack_testing::command::program("bagtrack");
+    let copied = Command::new("cp").arg(program).arg(&own).status();
+    assert!(copied.unwrap().success());
+    let (service, client) = (Program::spawn(&mut serve(&own)).unwrap(), Client::new());
+    std::fs::remove_file(&own).unwrap();
+    let url = service.url(&format!("/track?box={BOX}"));
+    let answer = client.post(url).body(video("mp4")).send().await.unwrap();
+    assert_eq!(answer.status(), 200);
+    assert_eq!(lines(answer).await.len(), FRAMES as usize);
+}
+
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn the_program_decodes_a_video_with_few_rights_and_without_ffmpeg_says_so() {
+    for (program, status) in [("ffmpeg", 200), ("/nowhere/ffmpeg", 415)] {
+        let (service, client) = (Program::start(&["--ffmpeg", program], &[]), Client::new());
+        let create = client.post(service.url(&format!("/sessions?box={BOX}")));
+        let created = create.body(pictures::png(0)).send().await.unwrap();
+        let created = expect(created, reqwest::StatusCode::CREATED).await;
+        let url = format!("/sessions/{}/frames", created["id"].as_str().unwrap());
+        // Its index is at the end, so the decoder goes back in it.
+        let post = client.post(service.url(&url)).body(video("mp4"));
+        let answer = post.send().await.unwrap();
+        assert_eq!(answer.status(), status);
+        if status == 200 {
+            assert_eq!(lines(answer).await.len(), FRAMES as usize);
+        }
+    }
+}
