@@ -27,7 +27,7 @@ pub use flag_values::{parse_duration, parse_listen};
 pub use jwt::JwtConfig;
 pub use limits::{LimitsConfig, OFF};
 pub use memory_bound::{MAX_BUFFER_BYTES, MemoryBound, PROBE_CONNECTIONS};
-pub use service::Config;
+pub use service::{BODY_BYTES_PER_SECOND, Config};
 pub use settings::{ConfigError, Secret};
 pub use store::StoreConfig;
 #[cfg(feature = "tls")]

@@ -74,7 +74,7 @@ settings! {
         /// Time for a client to send its request head, and for its TLS handshake before; a connection that is idle for
         /// longer is closed too.
         header_timeout: Duration = Duration::from_secs(30), moment;
-        /// Time for a client to send its request body.
+        /// Time for a client to send its request body. Each 64 KiB of it give a second more.
         body_timeout: Duration = Duration::from_secs(30), moment;
 
         # "Access and keys"
@@ -102,7 +102,16 @@ settings! {
     }
 }
 
+/// Bytes of a request body that give its client a second more: a video may take longer than a frame.
+pub const BODY_BYTES_PER_SECOND: u32 = 64 << 10;
+
 impl Config {
+    /// The time that the largest body may take.
+    pub fn longest_body(&self) -> Duration {
+        let more = self.max_body_bytes as u64 / u64::from(BODY_BYTES_PER_SECOND);
+        self.body_timeout.saturating_add(Duration::from_secs(more))
+    }
+
     /// Checks every setting.
     ///
     /// # Errors

@@ -65,7 +65,7 @@ struct Frame {
 pub struct Rates {
     /// Least bytes a second.
     pub bytes: LeastRate,
-    /// The time of a message, which no bytes pay back.
+    /// The time of a message, of which its bytes give some back.
     pub message: LeastRate,
     /// Most frames a second, of all streams of the client.
     pub messages: Arc<MessageRate>,
@@ -238,7 +238,7 @@ impl<S: AsyncRead + Unpin> Fragments<S> {
             Poll::Ready(read) => {
                 read?;
                 self.rate.moved(buffer.filled().len());
-                self.deadline.pause();
+                self.deadline.moved(buffer.filled().len());
                 self.input.extend_from_slice(buffer.filled());
                 self.is_heard |= !buffer.filled().is_empty();
                 Poll::Ready(Ok(!buffer.filled().is_empty()))

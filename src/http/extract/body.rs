@@ -4,19 +4,19 @@
 //! copied into one buffer as they arrive, since a chunk of one byte by itself takes many times that.
 //!
 //! A body has a least rate: a client that sends a byte now and then would hold its connection and its session's place
-//! until the deadline of the body.
+//! until the deadline of the body. That comes later the more has arrived, so that a video may take its time.
 
 use crate::http::problems::problem::Problem;
 use axum::body::{Body, Bytes};
 use axum::extract::multipart::MultipartError;
 use axum::http::StatusCode;
-use bagtrack_config::Config;
+use bagtrack_config::{BODY_BYTES_PER_SECOND, Config};
 use bagtrack_net::LeastRate;
 use bagtrack_sessions::{BudgetFull, Charge};
 use futures_util::{StreamExt, stream};
 use http_body_util::{BodyExt, LengthLimitError, Limited};
 use std::error::Error;
-use std::task::{Poll, ready};
+use std::task::Poll;
 use tower_http::timeout::TimeoutError;
 
 /// Bytes that a buffer begins with, where the body is not smaller.
@@ -86,6 +86,7 @@ pub(super) fn paced(body: Body, config: &Config, mut charge: Option<Charge>) -> 
     let rate = LeastRate::new(limits.body_grace, limits.min_body_rate);
     // What comes early may be followed by a pause.
     let mut rate = rate.with_credit(config.body_timeout);
+    let mut deadline = LeastRate::new(config.body_timeout, BODY_BYTES_PER_SECOND);
     let mut pieces = body.into_data_stream();
     let mut pay = move |piece: &Bytes| match &mut charge {
         Some(charge) => charge.grow(piece.len()).map_err(axum::Error::new),
@@ -95,12 +96,17 @@ pub(super) fn paced(body: Body, config: &Config, mut charge: Option<Charge>) -> 
         match pieces.poll_next_unpin(cx) {
             Poll::Ready(Some(Ok(piece))) => {
                 rate.moved(piece.len());
+                deadline.moved(piece.len());
                 Poll::Ready(Some(pay(&piece).map(|()| piece)))
             }
             Poll::Ready(other) => Poll::Ready(other),
             Poll::Pending => {
-                ready!(rate.poll_late(cx));
-                Poll::Ready(Some(Err(axum::Error::new(TooSlow))))
+                let are_in_time =
+                    [&mut rate, &mut deadline].map(|it| it.poll_late(cx).is_pending());
+                match are_in_time {
+                    [true, true] => Poll::Pending,
+                    _ => Poll::Ready(Some(Err(axum::Error::new(TooSlow)))),
+                }
             }
         }
     }))

@@ -81,7 +81,7 @@ fn with_layers(routes: Router, state: &AppState) -> Router {
         CatchPanicLayer::custom(panic_response),
         middleware::from_fn(one_host),
         cors(&config.cors_origins),
-        RequestBodyDeadlineLayer::new(config.body_timeout),
+        RequestBodyDeadlineLayer::new(config.longest_body()),
     );
     let of_bodies = (
         middleware::from_fn_with_state(with_state(), drain_refused),

@@ -14,6 +14,7 @@ use axum::extract::{FromRequestParts, State};
 use axum::http::request::Parts;
 use axum::response::Response;
 use bagtrack_api::requests::StreamSettings;
+use bagtrack_config::BODY_BYTES_PER_SECOND;
 use bagtrack_net::{ConnectionHold, LeastRate, Rates};
 use bagtrack_quotas::{Account, Client};
 use bagtrack_sessions::{Flow, ReplayError, Session, StreamPlace};
@@ -121,7 +122,7 @@ fn message_limits(state: &AppState, session: &Session, account: &Account) -> Mes
         budgets: [state.uploads.clone(), account.bytes().clone()],
         rates: Rates {
             bytes: LeastRate::new(config.body_timeout, config.limits.min_body_rate),
-            message: LeastRate::new(config.body_timeout, u32::MAX),
+            message: LeastRate::new(config.body_timeout, BODY_BYTES_PER_SECOND),
             messages: account.messages(),
         },
     }

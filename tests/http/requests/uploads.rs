@@ -7,8 +7,11 @@ use crate::pictures;
 use bagtrack_testing::within::within;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
+use futures_util::stream;
 use reqwest::StatusCode;
 use serde_json::json;
+use std::collections::VecDeque;
+use std::io;
 use std::time::Duration;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -75,6 +78,30 @@ async fn json_counts_with_the_copies_that_parsing_makes() {
     expect_problem(response, "quota-exceeded").await;
     let response = post().body(padded).send().await.unwrap();
     expect(response, StatusCode::OK).await;
+}
+
+/// A video over a usual line: it had 30 seconds in all.
+#[tokio::test]
+async fn a_large_body_that_comes_steadily_has_more_time_than_a_small_one() {
+    const PIECE: usize = 64 << 10;
+    let app = TestApplication::start_with(|config| config.body_timeout = Duration::from_secs(1));
+    let app = app.await;
+    let id = app.open().await;
+    let mut padded = pictures::png(1);
+    padded.resize(10 * PIECE, 0);
+    let pieces = padded.chunks(PIECE).map(<[u8]>::to_vec);
+    let clock = tokio::time::interval(Duration::from_millis(250));
+    let line = stream::unfold(
+        (clock, pieces.collect::<VecDeque<_>>()),
+        |(mut clock, mut left)| async {
+            clock.tick().await;
+            let piece = left.pop_front()?;
+            Some((Ok::<_, io::Error>(piece), (clock, left)))
+        },
+    );
+    let body = reqwest::Body::wrap_stream(line);
+    let answer = app.frames_request(&id, &[]).body(body).send().await;
+    expect(answer.unwrap(), StatusCode::OK).await;
 }
 
 #[tokio::test]
