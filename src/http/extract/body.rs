@@ -101,11 +101,10 @@ pub(super) fn paced(body: Body, config: &Config, mut charge: Option<Charge>) -> 
             }
             Poll::Ready(other) => Poll::Ready(other),
             Poll::Pending => {
-                let are_in_time =
-                    [&mut rate, &mut deadline].map(|it| it.poll_late(cx).is_pending());
-                match are_in_time {
-                    [true, true] => Poll::Pending,
-                    _ => Poll::Ready(Some(Err(axum::Error::new(TooSlow)))),
+                let is_slow = rate.poll_late(cx).is_ready();
+                match deadline.poll_late(cx).is_ready() || is_slow {
+                    true => Poll::Ready(Some(Err(axum::Error::new(TooSlow)))),
+                    false => Poll::Pending,
                 }
             }
         }
