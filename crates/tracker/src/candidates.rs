@@ -62,7 +62,7 @@ impl RotatedView {
 pub(crate) struct Candidates {
     pub particles: Vec<Particle>,
     /// The feature vectors, with the mean of the appearance model subtracted.
-    vectors: AlignedBuffer,
+    vectors: AlignedBuffer<f32>,
     /// D.
     len: usize,
     /// Their squared lengths.

@@ -6,12 +6,14 @@ use pulp::{Arch, Simd};
 use crate::appearance::background::Background;
 use crate::appearance::bag::Bag;
 use crate::appearance::span::Span;
-use crate::linalg::scratch::AlignedBuffer;
+use crate::linalg::fixed_point::FixedPoint;
 
 /// The rows, each of length D, and what is known of them beside.
 #[derive(Debug, Default)]
 pub(crate) struct BagMatrix {
-    values: AlignedBuffer,
+    pub rows: FixedPoint,
+    /// The rows as they are computed.
+    values: Vec<f32>,
     /// The templates of an entry.
     templates: Vec<f32>,
     /// The number of samples, and L⁻¹ of the metric.
@@ -42,8 +44,8 @@ pub(crate) fn load_simd<S: Simd>(
     let sizes = entries.iter().map(|entry| (entry.norm, entry.dim));
     matrix.entries.extend(sizes);
     let count = matrix.samples + matrix.subspace_rows() + queries.len();
-    matrix.values.resize(count * len);
-    let (samples, mut rest) = matrix.values.values_mut().split_at_mut(metric.count * len);
+    matrix.values.resize(count * len, 0.0);
+    let (samples, mut rest) = matrix.values.split_at_mut(metric.count * len);
     background.write_samples(samples);
     matrix.background_coordinates.clear();
     for span in entries {
@@ -56,15 +58,10 @@ pub(crate) fn load_simd<S: Simd>(
     for (row, query) in rest.chunks_exact_mut(len).zip(queries) {
         row[..query.len()].copy_from_slice(query);
     }
+    matrix.rows.set(&matrix.values, len);
 }
 
 impl BagMatrix {
-    /// The rows, one after the other.
-    #[inline(always)]
-    pub fn rows(&self) -> &[f32] {
-        self.values.values()
-    }
-
     /// The number of means and basis vectors.
     #[inline(always)]
     pub fn subspace_rows(&self) -> usize {

@@ -9,15 +9,14 @@ use pulp::{Arch, Simd};
 use serde::de::{DeserializeOwned, Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Added to a number below 2^22, it leaves the nearest whole number in the last bits.
-const ROUND: f32 = 12_582_912.0;
+use crate::linalg::fixed_point::{self, FromBits};
 
 /// A quantised value.
-pub(crate) trait Level: Copy + Default + Into<f32> + Serialize + DeserializeOwned {
+pub(crate) trait Level:
+    Copy + Default + FromBits + Into<f32> + Serialize + DeserializeOwned
+{
     /// The largest one.
     const MAX: f32;
-    /// The number in the last bits.
-    fn from_bits(bits: u32) -> Self;
     /// Writes values to a snapshot.
     fn serialize_all<S: Serializer>(values: &[Self], serializer: S) -> Result<S::Ok, S::Error> {
         values.serialize(serializer)
@@ -33,10 +32,6 @@ const NONE: i8 = -8;
 
 impl Level for i8 {
     const MAX: f32 = 7.0;
-    #[inline(always)]
-    fn from_bits(bits: u32) -> Self {
-        bits as i8
-    }
     /// Two in a byte.
     fn serialize_all<S: Serializer>(values: &[i8], serializer: S) -> Result<S::Ok, S::Error> {
         // A pair as one number of 16 bits: so the compiler takes many at once.
@@ -77,10 +72,6 @@ impl Visitor<'_> for Pairs {
 
 impl Level for i16 {
     const MAX: f32 = 511.0;
-    #[inline(always)]
-    fn from_bits(bits: u32) -> Self {
-        bits as i16
-    }
 }
 
 /// A vector: `scale` times whole numbers.
@@ -101,14 +92,8 @@ pub(crate) type QuantizedVector = Quantized<i8>;
 #[pulp::with_simd(quantize = Arch::new())]
 #[inline(always)]
 fn quantize_simd<S: Simd, T: Level>(_: S, vector: &mut Quantized<T>, features: &[f32]) {
-    // The bits of positive numbers are in their order, and the maximum of whole numbers vectorises.
-    let magnitudes = features.iter().map(|value| value.abs().to_bits());
-    vector.scale = f32::from_bits(magnitudes.fold(0, u32::max)) / T::MAX;
-    let inverse = 1.0 / vector.scale.max(f32::MIN_POSITIVE);
     vector.values.resize(features.len(), T::default());
-    for (quantized, value) in vector.values.iter_mut().zip(features) {
-        *quantized = T::from_bits((value * inverse + ROUND).to_bits());
-    }
+    vector.scale = fixed_point::quantize(features, T::MAX, &mut vector.values);
 }
 
 impl<T: Level> Quantized<T> {

@@ -28,16 +28,16 @@ pub(crate) fn multiply<S: Simd, T: Element>(
     b: &[T],
     len: usize,
     stride: usize,
-    out: &mut [T],
+    out: &mut [T::Sum],
 ) {
     assert!(stride >= b.len() / len, "a row of `out` holds all products");
-    if cfg!(target_family = "wasm") {
-        // Engines keep two of a processor's 16 registers for themselves, and need one for a product.
-        multiply_tiles::<S, T, 4, 2>(simd, a, b, len, stride, out);
-    } else if S::REGISTER_COUNT >= 32 {
+    // In WebAssembly pulp counts 32 registers, but engines have a processor's 16, and keep two for themselves.
+    if S::REGISTER_COUNT >= 32 && !cfg!(target_family = "wasm") {
         multiply_tiles::<S, T, 6, 4>(simd, a, b, len, stride, out);
-    } else {
+    } else if T::IS_FUSED {
         multiply_tiles::<S, T, 4, 3>(simd, a, b, len, stride, out);
+    } else {
+        multiply_tiles::<S, T, 4, 2>(simd, a, b, len, stride, out);
     }
 }
 
@@ -48,7 +48,7 @@ fn multiply_tiles<S: Simd, T: Element, const A: usize, const B: usize>(
     b: &[T],
     len: usize,
     stride: usize,
-    out: &mut [T],
+    out: &mut [T::Sum],
 ) {
     let (count_a, count_b) = (a.len() / len, b.len() / len);
     let block_len = BLOCK / B * B;
@@ -85,7 +85,7 @@ pub(crate) fn tile<S: Simd, T: Element, const A: usize, const B: usize>(
     simd: S,
     a: [&[T]; A],
     b: [&[T]; B],
-) -> [[T; B]; A] {
+) -> [[T::Sum; B]; A] {
     let (first, _) = T::lanes::<S>(a[0]);
     let count = first.len();
     let mut lanes_a = [first; A];
@@ -98,7 +98,7 @@ pub(crate) fn tile<S: Simd, T: Element, const A: usize, const B: usize>(
     }
     let mut sums = [[T::zeros(simd); B]; A];
     for k in 0..count {
-        let mut at_b = [T::zeros(simd); B];
+        let mut at_b = [lanes_b[0][k]; B];
         for q in 0..B {
             at_b[q] = lanes_b[q][k];
         }
@@ -109,16 +109,13 @@ pub(crate) fn tile<S: Simd, T: Element, const A: usize, const B: usize>(
             }
         }
     }
-    let mut products = [[T::default(); B]; A];
-    for at in 0..A * B {
-        products[at / B][at % B] = T::sum(simd, sums[at / B][at % B]);
-    }
+    let mut products = T::sum(simd, sums);
     for p in 0..A {
         let rest_a = T::lanes::<S>(a[p]).1;
         for q in 0..B {
             let rest_b = T::lanes::<S>(b[q]).1;
             for (&x, &y) in rest_a.iter().zip(rest_b) {
-                products[p][q] += x * y;
+                products[p][q] += x.product(y);
             }
         }
     }
@@ -153,6 +150,40 @@ mod tests {
                     assert!((f64::from(out_single[i * stride + j]) - plain).abs() < 1e-4);
                 }
                 assert_eq!(out[i * stride + count_b..][..2], [9.0; 2]);
+            }
+        }
+    }
+
+    /// Exactly, whatever the machine has: each kind of instruction that there is here.
+    #[test]
+    fn products_of_whole_numbers_are_exact() {
+        for (count_a, count_b, len) in [(1, 1, 5), (7, 5, 64), (40, 21, 71), (13, 9, 768)] {
+            let whole = |count, seed| {
+                let values = numbers::<f32>(count * len, seed).into_iter();
+                values
+                    .map(|value| (value * 1600.0) as i16)
+                    .collect::<Vec<_>>()
+            };
+            let (a, b) = (whole(count_a, 1), whole(count_b, 2));
+            let mut expected = Vec::new();
+            for a in a.chunks(len) {
+                let products = b.chunks(len).map(|b| {
+                    let pairs = a.iter().zip(b);
+                    pairs.map(|(&a, &b)| i32::from(a) * i32::from(b)).sum()
+                });
+                expected.extend(products.collect::<Vec<i32>>());
+            }
+            let mut out = vec![9; expected.len()];
+            inner_products(&a, &b, len, count_b, &mut out);
+            assert_eq!(out, expected);
+            out.fill(9);
+            multiply(pulp::Scalar::new(), &a, &b, len, count_b, &mut out);
+            assert_eq!(out, expected);
+            #[cfg(target_arch = "x86_64")]
+            if let Some(v3) = pulp::x86::V3::try_new() {
+                out.fill(9);
+                v3.vectorize(|| multiply(v3, &a, &b, len, count_b, &mut out));
+                assert_eq!(out, expected);
             }
         }
     }

@@ -2,8 +2,9 @@
 //!
 //! | file | computes |
 //! |---|---|
-//! | `gemm` | all inner products of two sets of vectors, f32 or f64 |
-//! | `element` | f32 or f64 in vector registers |
+//! | `gemm` | all inner products of two sets of vectors, f32, f64 or i16 |
+//! | `fixed_point` | f32 vectors as whole numbers, and their inner products |
+//! | `element` | f32, f64 or i16 in vector registers |
 //! | `combinations` | linear combinations of f32 vectors |
 //! | `vector_ops` | inner products, sums and lengths of single f32 vectors |
 //! | `jacobi` | eigenvalues and eigenvectors of one small symmetric matrix, f64 |
@@ -23,6 +24,7 @@
 pub(crate) mod acos;
 pub(crate) mod combinations;
 pub(crate) mod element;
+pub(crate) mod fixed_point;
 pub(crate) mod gemm;
 pub(crate) mod jacobi;
 pub(crate) mod scratch;
