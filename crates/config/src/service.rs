@@ -106,12 +106,6 @@ settings! {
 pub const BODY_BYTES_PER_SECOND: u32 = 64 << 10;
 
 impl Config {
-    /// The time that the largest body may take.
-    pub fn longest_body(&self) -> Duration {
-        let more = self.max_body_bytes as u64 / u64::from(BODY_BYTES_PER_SECOND);
-        self.body_timeout.saturating_add(Duration::from_secs(more))
-    }
-
     /// Checks every setting.
     ///
     /// # Errors

@@ -2,22 +2,15 @@
 //!
 //! Memory is charged before it is taken: a body that only announces its length, or sends nothing, holds none. Bytes are
 //! copied into one buffer as they arrive, since a chunk of one byte by itself takes many times that.
-//!
-//! A body has a least rate: a client that sends a byte now and then would hold its connection and its session's place
-//! until the deadline of the body. That comes later the more has arrived, so that a video may take its time.
 
 use crate::http::problems::problem::Problem;
 use axum::body::{Body, Bytes};
 use axum::extract::multipart::MultipartError;
 use axum::http::StatusCode;
-use bagtrack_config::{BODY_BYTES_PER_SECOND, Config};
-use bagtrack_net::LeastRate;
 use bagtrack_sessions::{BudgetFull, Charge};
-use futures_util::{StreamExt, stream};
+use futures_util::StreamExt;
 use http_body_util::{BodyExt, LengthLimitError, Limited};
 use std::error::Error;
-use std::task::Poll;
-use tower_http::timeout::TimeoutError;
 
 /// Bytes that a buffer begins with, where the body is not smaller.
 const FIRST_BYTES: usize = 64 << 10;
@@ -30,10 +23,10 @@ pub(super) const MAX_HEAD_BYTES: usize = 16 << 10;
 #[error("the head of a part has more than {MAX_HEAD_BYTES} bytes")]
 pub(super) struct HeadTooLong;
 
-/// The body came more slowly than it may.
+/// The body came more slowly than [it may](crate::http::middleware::body_pace).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the body is too slow")]
-struct TooSlow;
+pub struct TooSlow;
 
 /// Bytes that arrive, with the memory that they are charged to.
 pub(super) struct Buffer<'a> {
@@ -79,35 +72,12 @@ impl<'a> Buffer<'a> {
     }
 }
 
-/// A body that fails when it is slower than these settings say. Where its reader keeps what arrives, `charge` pays for
-/// that.
-pub(super) fn paced(body: Body, config: &Config, mut charge: Option<Charge>) -> Body {
-    let limits = &config.limits;
-    let rate = LeastRate::new(limits.body_grace, limits.min_body_rate);
-    // What comes early may be followed by a pause.
-    let mut rate = rate.with_credit(config.body_timeout);
-    let mut deadline = LeastRate::new(config.body_timeout, BODY_BYTES_PER_SECOND);
-    let mut pieces = body.into_data_stream();
-    let mut pay = move |piece: &Bytes| match &mut charge {
-        Some(charge) => charge.grow(piece.len()).map_err(axum::Error::new),
-        None => Ok(()),
-    };
-    Body::from_stream(stream::poll_fn(move |cx| {
-        match pieces.poll_next_unpin(cx) {
-            Poll::Ready(Some(Ok(piece))) => {
-                rate.moved(piece.len());
-                deadline.moved(piece.len());
-                Poll::Ready(Some(pay(&piece).map(|()| piece)))
-            }
-            Poll::Ready(other) => Poll::Ready(other),
-            Poll::Pending => {
-                let is_slow = rate.poll_late(cx).is_ready();
-                match deadline.poll_late(cx).is_ready() || is_slow {
-                    true => Poll::Ready(Some(Err(axum::Error::new(TooSlow)))),
-                    false => Poll::Pending,
-                }
-            }
-        }
+/// A body whose reader keeps what arrives: `charge` pays for that.
+pub(super) fn charged(body: Body, mut charge: Charge) -> Body {
+    Body::from_stream(body.into_data_stream().map(move |piece| {
+        let piece = piece?;
+        charge.grow(piece.len()).map_err(axum::Error::new)?;
+        Ok::<_, axum::Error>(piece)
     }))
 }
 
@@ -117,13 +87,12 @@ pub(super) fn paced(body: Body, config: &Config, mut charge: Option<Charge>) -> 
 /// It is too large, too slow or cut short, or there is no memory for it.
 pub(super) async fn read(
     body: Body,
-    config: &Config,
+    max_bytes: usize,
     charge: &mut Charge,
 ) -> Result<Bytes, Problem> {
-    let max_bytes = config.max_body_bytes;
     let announced = http_body::Body::size_hint(&body).upper();
     let announced = announced.and_then(|bytes| usize::try_from(bytes).ok());
-    let mut body = Limited::new(paced(body, config, None), max_bytes);
+    let mut body = Limited::new(body, max_bytes);
     let mut buffer = Buffer::new(announced.unwrap_or(max_bytes).min(max_bytes), charge);
     while let Some(frame) = body.frame().await {
         let frame = frame.map_err(|error| problem(error.as_ref(), max_bytes))?;
@@ -143,7 +112,7 @@ pub(super) fn problem(error: &(dyn Error + 'static), max_bytes: usize) -> Proble
         if error.is::<LengthLimitError>() {
             return Problem::body_too_large(max_bytes);
         }
-        if error.is::<TimeoutError>() || error.is::<TooSlow>() {
+        if error.is::<TooSlow>() {
             return Problem::body_timeout();
         }
         if error.is::<HeadTooLong>() {

@@ -16,7 +16,7 @@
 
 pub mod admitted;
 pub mod answer_form;
-mod body;
+pub mod body;
 pub mod caller;
 pub mod idempotency_key;
 pub mod instance;

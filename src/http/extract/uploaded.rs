@@ -1,6 +1,6 @@
 //! The frames and settings of a request, whichever form they came in.
 
-use super::body::{self, paced};
+use super::body::{self, charged};
 use super::caller::client_of;
 use super::json;
 use super::multipart;
@@ -127,15 +127,15 @@ impl Arrived {
     ) -> Result<Self, Problem> {
         let new_charge = || Charge::new(&state.uploads, permit.bytes());
         let (mut charge, mut fields, mut json) = (new_charge(), Fields::default(), None);
+        let max_bytes = state.config.max_body_bytes;
         if media_type == "multipart/form-data" {
             // The parser keeps bytes that it has not given out yet; they are charged beside the files.
-            let arriving = Some(new_charge());
-            let request = request.map(|body| paced(body, &state.config, arriving));
-            let max_bytes = state.config.max_body_bytes;
+            let arriving = new_charge();
+            let request = request.map(|body| charged(body, arriving));
             multipart::read::<S>(request, max_bytes, max_files, &mut fields, &mut charge).await?;
         } else {
             let body = request.into_body();
-            let bytes = body::read(body, &state.config, &mut charge).await?;
+            let bytes = body::read(body, max_bytes, &mut charge).await?;
             // Labels are often wrong: those of curl's -d, and of generated clients that send a file.
             let is_labelled = media_type == "application/json";
             if let Some(text) = json::text_of(&bytes, is_labelled) {

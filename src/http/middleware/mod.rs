@@ -8,6 +8,7 @@
 pub mod answer_problems;
 pub mod authenticate;
 pub mod base_path;
+pub mod body_pace;
 pub mod client_identity;
 pub mod cors;
 pub mod count_requests;

@@ -4,6 +4,7 @@ use crate::http::extract::instance::{Instance, REQUEST_ID, remove_unusable_id};
 use crate::http::middleware::answer_problems::{answer_problems, panic_response};
 use crate::http::middleware::authenticate::{authenticate, authenticate_metrics};
 use crate::http::middleware::base_path::mount;
+use crate::http::middleware::body_pace::pace_body;
 use crate::http::middleware::client_identity::identify;
 use crate::http::middleware::cors::cors;
 use crate::http::middleware::count_requests::count_request;
@@ -34,7 +35,6 @@ use axum::routing::get;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
 use tower_http::set_header::SetResponseHeaderLayer;
-use tower_http::timeout::RequestBodyDeadlineLayer;
 
 /// The whole service. `extra` routes are served beside its own. They pass through the layers of all requests, and not
 /// through those of [`routes`], which say who may use the service.
@@ -81,9 +81,9 @@ fn with_layers(routes: Router, state: &AppState) -> Router {
         CatchPanicLayer::custom(panic_response),
         middleware::from_fn(one_host),
         cors(&config.cors_origins),
-        RequestBodyDeadlineLayer::new(config.longest_body()),
     );
     let of_bodies = (
+        middleware::from_fn_with_state(with_state(), pace_body),
         middleware::from_fn_with_state(with_state(), drain_refused),
         DefaultBodyLimit::max(config.max_body_bytes),
     );

@@ -121,6 +121,23 @@ async fn a_body_slower_than_the_least_rate_is_408_in_every_form() {
     assert_eq!(app.frames_of(&id).await, 1);
 }
 
+/// The rest of it was waited for until the deadline of the largest body.
+#[tokio::test]
+async fn the_rest_of_a_refused_body_has_the_same_least_rate() {
+    let app = TestApplication::start_with(|config| {
+        config.body_timeout = Duration::from_secs(600);
+        config.limits.body_grace = Duration::from_millis(50);
+        config.limits.min_body_rate = 1_000_000;
+    });
+    let app = app.await;
+    let mut connection = RawConnection::open(app.address).await;
+    let head = "POST /sessions/none/frames HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9000000\r\n\r\nbegun";
+    connection.send(head).await;
+    let answer = tokio::time::timeout(Duration::from_secs(30), connection.read_to_end());
+    let answer = answer.await.expect("the connection ends within a moment");
+    assert!(answer.starts_with("HTTP/1.1 404"), "{answer}");
+}
+
 #[tokio::test]
 async fn a_length_over_the_limit_is_refused_before_the_body_is_sent() {
     let app = TestApplication::start().await;
