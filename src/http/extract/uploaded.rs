@@ -106,6 +106,11 @@ impl<S: Settings> Upload<S> {
         if upload.video.is_none() {
             permit.count_frames(upload.files.len())?;
         }
+        // One frame may be refused for a newer one; the work of several would be lost.
+        let queue = match upload.video.is_some() || upload.files.len() > 1 {
+            true => queue.waiting(),
+            false => queue,
+        };
         Ok((upload, queue))
     }
 }

@@ -101,11 +101,6 @@ impl VideoFrames {
         self.pictures.close();
     }
 
-    /// Whether a frame was given.
-    pub fn has_given(&self) -> bool {
-        self.given > 0
-    }
-
     /// The next frame; none after the last.
     pub async fn next(&mut self) -> Option<Result<VideoPicture, Problem>> {
         let next = timeout(self.patience, self.pictures.recv()).await;

@@ -7,6 +7,13 @@ use std::error::Error;
 use std::sync::Arc;
 use std::time::Duration;
 
+/// What details end with where a whole request is refused.
+const UNCHANGED: [&str; 3] = [
+    "Nothing was changed.",
+    "None of them was tracked.",
+    "The session is unchanged.",
+];
+
 /// What went wrong with a request.
 #[derive(Debug, Clone)]
 pub struct Problem {
@@ -118,6 +125,15 @@ impl Problem {
     pub fn and(mut self, more: &str) -> Self {
         self.detail = format!("{} {more}", self.detail);
         self
+    }
+
+    /// Says that the lines before it count, in place of what is true of a whole request that is refused.
+    pub fn after_lines(mut self) -> Self {
+        let of_all = UNCHANGED
+            .iter()
+            .find_map(|said| self.detail.strip_suffix(said));
+        self.detail = of_all.unwrap_or(&self.detail).trim_end().to_owned();
+        self.and("The lines before this one count.")
     }
 
     /// Says which of `count` frames is meant.

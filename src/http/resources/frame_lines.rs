@@ -161,9 +161,6 @@ impl SessionFrames {
         };
         match video.next().await {
             Some(Ok(picture)) => Some(Ok(picture.jpeg.into())),
-            Some(Err(problem)) if video.has_given() => {
-                Some(Err(problem.and("The frames before count.")))
-            }
             Some(Err(problem)) => Some(Err(problem)),
             None => self.too_old.take().map(Err),
         }

@@ -46,7 +46,7 @@ pub async fn respond<F: FrameSequence>(
             match frames.next().await?.and_then(|answer| line(&answer)) {
                 Ok(line) => Some((line, Some(frames))),
                 Err(problem) => {
-                    let document = instance.report(&state, &problem);
+                    let document = instance.report(&state, &problem.after_lines());
                     Some((line(&document).unwrap_or_default(), None))
                 }
             }

@@ -7,12 +7,16 @@ use crate::helpers::heavy;
 use crate::helpers::raw::RawConnection;
 use crate::operation::metrics::{metrics, value};
 use crate::pictures;
+use crate::requests::lines::LINES;
 use crate::stream_client::{Received, StreamClient};
 use bagtrack::http::{Config, Secret};
 use bagtrack_testing::within::within;
+use reqwest::multipart::{Form, Part};
 use reqwest::{Method, RequestBuilder, Response, StatusCode};
+use std::convert::Infallible;
 use std::net::IpAddr;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 const GREEDY: &str = "198.51.100.1";
@@ -513,6 +517,54 @@ async fn frames_of_a_client_that_sends_too_many_are_refused_and_change_nothing()
         .await
         .unwrap();
     assert_eq!(expect(view, StatusCode::OK).await["frames"], frame + 1);
+}
+
+/// Their frames were refused one by one, and the lines before the refusal were all that was left of the request.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn several_frames_of_a_request_wait_where_single_ones_are_refused() {
+    const FRAMES: usize = 40;
+    let app = TestApplication::start_with(|config| {
+        behind_a_proxy(config);
+        config.workers = Some(1);
+        config.queue_delay = Duration::from_millis(5);
+    });
+    let app = app.await;
+    let mut ids = Vec::new();
+    for _ in 0..24 {
+        ids.push(open(&app, GREEDY).await);
+    }
+    let refused = &AtomicUsize::new(0);
+    let single = async |id: String| -> Infallible {
+        loop {
+            let path = format!("/sessions/{id}/frames");
+            let request = request_as(&app, GREEDY, &path, &[]).body(pictures::png(1));
+            if request.send().await.unwrap().status() == StatusCode::SERVICE_UNAVAILABLE {
+                refused.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+    };
+    let id = ids.pop().expect("it is one of those that are open");
+    let several = async {
+        while refused.load(Ordering::Relaxed) == 0 {
+            tokio::task::yield_now().await;
+        }
+        let mut form = Form::new();
+        for _ in 0..FRAMES {
+            form = form.part("frame", Part::bytes(pictures::png(1)));
+        }
+        let path = format!("/sessions/{id}/frames");
+        let request = request_as(&app, GREEDY, &path, &[]).header("accept", LINES);
+        let answer = request.multipart(form).send().await.unwrap();
+        (answer.status(), answer.text().await.unwrap())
+    };
+    let singles = futures_util::future::join_all(ids.into_iter().map(single));
+    let (status, lines) = tokio::select! {
+        answered = within(several, "all frames") => answered,
+        _ = singles => unreachable!("they have no end"),
+    };
+    assert_eq!(status, StatusCode::OK, "{lines}");
+    assert_eq!(lines.lines().count(), FRAMES, "{lines}");
+    assert!(!lines.contains("queue-full"), "{lines}");
 }
 
 /// Begins requests from this address, none of which ends, until a connection is refused.

@@ -133,6 +133,10 @@ async fn the_processor_time_of_all_frames_together_is_bounded() {
     let mut got = lines(request.send().await.unwrap()).await;
     let last = got.pop().unwrap();
     assert_eq!(last["type"], "/docs/problems#request-too-costly");
+    let detail = last["detail"].as_str().unwrap();
+    // Of a whole request it says that none was tracked.
+    let cure = "Send fewer or smaller frames in a request. The lines before this one count.";
+    assert!(detail.ends_with(cure), "{detail}");
     assert!((1..400).contains(&got.len()), "{} lines", got.len());
 }
 

@@ -76,8 +76,9 @@ impl QueuePermit {
         }
     }
 
-    /// For a client that sends no more before it has an answer: it waits for a worker, however long that takes.
-    pub(super) fn waiting(mut self) -> Self {
+    /// For work that cannot grow while it waits, as that of a client which sends no more before it has an answer, or of a
+    /// request with several frames: it waits for a worker, however long that takes.
+    pub fn waiting(mut self) -> Self {
         self.request.may_refuse = false;
         self
     }
