@@ -67,10 +67,13 @@ def _follow(
     is_first = True
     for number, frame in frames:
         for target, tracker in list(followed.items()):
-            if is_first:
-                tracker.init(frame, boxes[target])
-            else:
-                tracker.update(frame)
+            try:
+                if is_first:
+                    tracker.init(frame, boxes[target])
+                else:
+                    tracker.update(frame)
+            except (TypeError, ValueError) as error:
+                raise type(error)(f"frame {number} cannot be tracked: {error}") from error
             answer = TargetAnswer(number, tracker.box, tracker.score, tracker.status, target)
             if until_lost and not answer.ok:
                 del followed[target]

@@ -95,6 +95,12 @@ def test_what_cannot_be_used_is_told(clip: Clip) -> None:
         list(bagtrack.propagate(iter(frames), clip.box, start=2, backwards=True))
     with pytest.raises(ValueError, match="cannot be read"):
         list(bagtrack.propagate("no-such-file.mp4", clip.box))
+    # Which of a thousand it was, was not said.
+    for bad, error in ((frames[0][:-8], ValueError), (None, TypeError)):
+        with pytest.raises(error, match="^frame 2 cannot be tracked: "):
+            list(bagtrack.propagate([*frames[:2], bad], clip.box))
+    with pytest.raises(ValueError, match="^frame 1 cannot be tracked: "):
+        list(bagtrack.propagate(frames, (500, 500, 10, 10), start=1))
 
 
 def example(name: str, *arguments: object, path: Path | None = None) -> str:
