@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from typing import Any, AsyncIterable, AsyncIterator, Iterable, Optional, Sequence, TypeVar, Union
 
 import httpx
@@ -23,9 +24,13 @@ class AsyncClient(BaseClient):
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
-        self._http = httpx.AsyncClient(headers=self._headers, timeout=self._timeout)
+        self._connect()
 
     __init__.__doc__ = BaseClient.__init__.__doc__
+
+    def _connect(self) -> None:
+        self._http = httpx.AsyncClient(headers=self._headers, timeout=self._timeout)
+        self._process = os.getpid()
 
     @classmethod
     async def load(
@@ -108,6 +113,9 @@ class AsyncClient(BaseClient):
             self._services.previous()
             return None
         assert isinstance(step, Request)
+        if self._process != os.getpid():
+            # As `Client`.
+            self._connect()
         try:
             response = await self._http.request(**request_of(step, self._services, self._timeout))
         except httpx.TransportError as error:

@@ -537,6 +537,26 @@ def test_forked_processes_do_not_share_a_connection(start_server: StartServer, c
         process.join()
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+def test_a_forked_process_has_asynchronous_connections_of_its_own(start_server: StartServer, clip: Clip) -> None:
+    bodies = [file.read_bytes() for file in clip.files[:3]]
+    client = bagtrack.AsyncClient(start_server().url, seed=SEED, retry_for=10.0)
+    asyncio.run(client.init(bodies[0], clip.box))
+    context = multiprocessing.get_context("fork")
+    answers = context.Queue()
+
+    async def follow() -> tuple:
+        before = client._http
+        await client.init(bodies[0], clip.box)
+        boxes = [(await client.update(body))[1] for body in bodies[1:]]
+        return client._http is before, boxes
+
+    process = context.Process(target=lambda: answers.put(asyncio.run(follow())))
+    process.start()
+    assert answers.get(timeout=60) == (False, clip.answered()[1:3])
+    process.join()
+
+
 @pytest.mark.parametrize("window", [0, -1, 33])
 def test_a_window_that_a_stream_does_not_have_is_refused(start_server: StartServer, clip: Clip, window: int) -> None:
     body = clip.files[0].read_bytes()
