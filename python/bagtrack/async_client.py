@@ -62,7 +62,7 @@ class AsyncClient(BaseClient):
 
         source = frames if isinstance(frames, AsyncIterable) else each(frames)
         source = source.__aiter__()
-        run = Run(Stream(self._session, window).run())
+        run = Run(Stream(self._session, window, may_linger=True).run())
         socket = AsyncSocket(self._services, self._headers, self._timeout)
         step = run.next()
         try:

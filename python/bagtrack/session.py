@@ -124,6 +124,8 @@ class Session:
         self._uploads: dict[int, Upload] = {}
         """Frames by their numbers, without gaps."""
         self._tried_to_move = float("-inf")
+        self.stream: Any = None
+        """The `Stream` that goes on, if there is one."""
 
     def open(self, query: dict[str, str], body: bytes, media_type: str) -> Steps[None]:
         """Opens a session from a first frame or a snapshot; ends the one that there was."""
@@ -273,6 +275,7 @@ class Session:
             return
         path = self.path()
         self.id, self.answer, self._origin, self._uploads = None, None, None, {}
+        self.stream = None
         try:
             yield Request("DELETE", path)
         except ConnectionLost:

@@ -69,7 +69,8 @@ class Yield:
 class Stream:
     """The frames of a caller through a session's stream. `run` is a generator of steps."""
 
-    def __init__(self, session: Session, window: int) -> None:
+    def __init__(self, session: Session, window: int, *, may_linger: bool = False) -> None:
+        """`may_linger`: a loop that was left ends later, as those of asyncio do."""
         if not 1 <= window <= MOST_ON_THEIR_WAY:
             raise ValueError(f"window is from 1 to {MOST_ON_THEIR_WAY}, not {window}")
         self._session = session
@@ -80,20 +81,31 @@ class Stream:
         self._tries = 0
         """Connections since the last answer."""
         self._broken_since = 0.0
+        self._may_linger = may_linger
+        self.is_left = False
+        """Whether the caller has an answer, and may never ask for the next one."""
 
     def run(self) -> Steps[None]:
         """Sends frames and gives their answers, until there are no more frames."""
         session = self._session
         # Tells where there is no session.
         session.next_number()
-        while not (self._ended and self._answered() + 1 == session.next_number()):
-            try:
-                yield from self._connect()
-                yield from self._exchange()
-                yield Disconnect()
-            except ConnectionLost as broken:
-                yield Disconnect()
-                yield from self._mend(broken)
+        if session.stream is not None and not session.stream.is_left:
+            # Each would send the frames of the other, and get its answers.
+            raise RuntimeError("another `track` of this client goes on: leave its loop first, or use a client for each")
+        session.stream = self
+        try:
+            while not (self._ended and self._answered() + 1 == session.next_number()):
+                try:
+                    yield from self._connect()
+                    yield from self._exchange()
+                    yield Disconnect()
+                except ConnectionLost as broken:
+                    yield Disconnect()
+                    yield from self._mend(broken)
+        finally:
+            if session.stream is self:
+                session.stream = None
 
     def _answered(self) -> int:
         return self._session.answer.frame if self._session.answer else 0
@@ -141,8 +153,10 @@ class Stream:
             session.last_acknowledged = max(session.last_acknowledged, session.answer.frame)
             if session.needs_checkpoint(document):
                 reply = as_reply(document)
+            self.is_left = self._may_linger
             yield Yield(answer)
-            if session.answer is not answer:
+            self.is_left = False
+            if session.answer is not answer or session.stream is not self:
                 # The frames on their way have other numbers now.
                 raise RuntimeError("the client was used otherwise while `track` went on: leave its loop first")
 

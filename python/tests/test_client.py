@@ -627,6 +627,41 @@ def test_a_client_that_is_used_otherwise_within_a_stream_says_so(start_server: S
         assert [answer.box for answer in client.track(bodies[1:10])] == clip.answered()[1:10]
 
 
+@pytest.mark.parametrize("is_async", [False, True], ids=["blocking", "asyncio"])
+def test_two_streams_at_once_are_refused(start_server: StartServer, clip: Clip, is_async: bool) -> None:
+    """The second sent the frames of the first again, and gave their answers as its own."""
+    bodies = [file.read_bytes() for file in clip.files[:20]]
+    url, told = start_server().url, "another `track` of this client goes on: leave its loop first"
+
+    async def boxes(client: bagtrack.AsyncClient) -> list:
+        return [answer.box async for answer in client.track(bodies[1:])]
+
+    async def follow() -> list:
+        async with bagtrack.AsyncClient(url, seed=SEED) as client:
+            await client.init(bodies[0], clip.box)
+            first, second = await asyncio.gather(boxes(client), boxes(client), return_exceptions=True)
+            assert isinstance(second, RuntimeError) and told in str(second)
+            assert first == clip.answered()[1:20]
+            await client.init(bodies[0], clip.box)
+            async for _ in client.track(bodies[1:3], window=1):
+                break
+            # A loop that was left is none, though asyncio has not ended it yet.
+            return [answer.box async for answer in client.track(bodies[2:])]
+
+    if is_async:
+        assert asyncio.run(follow()) == clip.answered()[2:20]
+        return
+    with bagtrack.Client(url, seed=SEED) as client:
+        client.init(bodies[0], clip.box)
+        stream = client.track(bodies[1:10])
+        found = [next(stream).box]
+        with pytest.raises(RuntimeError, match=told):
+            next(client.track(bodies[10:]))
+        found += [answer.box for answer in stream]
+        found += [answer.box for answer in client.track(bodies[10:])]
+        assert found == clip.answered()[1:20]
+
+
 @pytest.mark.parametrize("messages", [['{"ok": true}'], ['{"next": 1}', '{"ok": true}']], ids=["hello", "answer"])
 @pytest.mark.parametrize("is_async", [False, True], ids=["blocking", "asyncio"])
 def test_what_is_no_answer_in_a_stream_is_told(
