@@ -17,12 +17,13 @@ use utoipa_axum::routes;
 #[openapi(
     info(
         title = "bagtrack",
-        description = "Follows one object through the frames that you upload. The first frame and a box open a \
-            session; every further frame gets a box back.\n\n\
+        description = "Follows an object, or up to 16, through the frames that you upload. The first frame and a box \
+            (`box`), or several (`boxes`), open a session; every further frame gets a box of each back.\n\n\
             A frame is sent as a raw body (the settings are in the query), as `multipart/form-data`, or as JSON \
             with base64. Its type is taken from its bytes: JPEG, PNG or WebP. Boxes are in the pixels of the \
             uploaded frame. Every error is a [problem document](problems) (RFC 9457) and leaves the session as it \
-            was, but for `work-timeout`, which says what to do. The `type` of a problem opens as a page. Paths that do not exist answer `route-not-found` (404). \
+            was, but for `work-timeout`, which says what to do. The `type` of a problem opens as a page. Paths that do \
+            not exist answer `route-not-found` (404). \
             Requests of web pages from origins that are not allowed answer `origin-not-allowed` (403), and requests \
             to hosts that are not allowed `host-not-allowed` (421). Who asks too often gets `quota-exceeded` (429).\n\n\
             Where the service has API keys, a request needs one, or a session token: `Authorization: Bearer …`. \

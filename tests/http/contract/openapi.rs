@@ -3,7 +3,7 @@
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::pictures;
 use bagtrack_tracker::{Params, Preset};
-use reqwest::StatusCode;
+use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 
 /// The greatest number that JSON holds exactly in every language.
@@ -232,6 +232,27 @@ fn a_body_has_one_raw_form_beside_the_form_and_json_and_errors_share_an_answer()
         }
     }
     assert!(bodies >= 5);
+}
+
+#[tokio::test]
+async fn calls_of_the_service_itself_have_the_rate_limits_that_the_document_says() {
+    let app = TestApplication::start().await;
+    let document = generated();
+    for (method, path, answered) in [
+        (Method::POST, "/frames", "4XX"),
+        (Method::GET, "/version", "200"),
+        (Method::GET, "/healthz", "200"),
+        (Method::GET, "/readyz", "200"),
+        (Method::GET, "/metrics", "200"),
+    ] {
+        let name = method.as_str().to_lowercase();
+        let said = &document["paths"][path][name]["responses"][answered]["headers"];
+        let response = app.request(method, path, &[]).send().await.unwrap();
+        for header in ["RateLimit", "RateLimit-Policy"] {
+            let is_sent = response.headers().contains_key(header);
+            assert_eq!(said[header].is_object(), is_sent, "{path}: {header}");
+        }
+    }
 }
 
 /// Swagger UI offers a file for a parameter with a content type, and nobody can type into that.

@@ -11,6 +11,8 @@ use utoipa::openapi::OpenApi;
 const EXAMPLE_ID: &str = "67e55044-10b1-426f-9247-bb680e5fe0c8";
 /// The calls that open a session.
 const OPENING: [&str; 2] = ["createSession", "putSession"];
+/// The calls that are answered without looking at who asks.
+const WITHOUT_CLIENT: [&str; 4] = ["getVersion", "getHealth", "getReadiness", "getMetrics"];
 /// A handshake cannot be made by following a link.
 const HANDSHAKE: &str = "openStream";
 
@@ -26,7 +28,10 @@ pub fn document(handlers: &OpenApi, base_path: &str) -> String {
     for operation in operations(&mut document) {
         complete_parameters(operation);
         add_problems(operation);
-        if operation["tags"] != json!(["service"]) {
+        let is_of_client = !WITHOUT_CLIENT
+            .iter()
+            .any(|id| operation["operationId"] == *id);
+        if is_of_client {
             add_rate_limits(operation);
         }
         if OPENING.iter().any(|id| operation["operationId"] == *id) {
