@@ -53,6 +53,7 @@ pub fn inspect<'file>(
 
 fn unread(bytes: &[u8]) -> IngestError {
     sniff::unread_type(bytes)
+        .or_else(|| sniff::is_base64(bytes).then_some("base64"))
         .or_else(|| sniff::is_text(bytes).then_some("text"))
         .map_or(IngestError::UnknownFormat, IngestError::UnreadFormat)
 }

@@ -98,6 +98,22 @@ pub fn is_text(bytes: &[u8]) -> bool {
     is_utf8 && !bytes.is_empty() && bytes.iter().all(is_letter)
 }
 
+/// Least letters that are told to be base64: fewer may be a name.
+const MIN_BASE64: usize = 128;
+
+/// Whether all is base64, in the standard alphabet or that of URLs, in lines or not; or a data URL with it.
+pub fn is_base64(bytes: &[u8]) -> bool {
+    const MARK: &[u8] = b";base64,";
+    let head = &bytes[..bytes.len().min(64)];
+    let mark = head.windows(MARK.len()).position(|part| part == MARK);
+    let text = match mark {
+        Some(at) if bytes.starts_with(b"data:") => &bytes[at + MARK.len()..],
+        _ => bytes,
+    };
+    let is_letter = |byte: &u8| byte.is_ascii_alphanumeric() || b"+/-_=\r\n".contains(byte);
+    text.len() >= MIN_BASE64 && text.iter().all(is_letter)
+}
+
 /// Which still image a file of boxes is; none where it is a video.
 fn still_image(bytes: &[u8]) -> Option<&'static str> {
     let length = bytes

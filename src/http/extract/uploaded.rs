@@ -176,13 +176,14 @@ fn admit(state: &AppState, parts: &Parts) -> Result<RequestPermit, Problem> {
     Ok(account.request()?)
 }
 
-/// Whether bytes have lost all line breaks and zeros, as `curl -d` sends a file. No image of this length is without.
+/// Whether bytes have lost all line breaks and zeros, as `curl -d` sends a file. No image of this length is without, or
+/// has letters alone, as a text.
 fn is_stripped(bytes: &[u8]) -> bool {
     let is_lost = |byte: &u8| matches!(byte, 0 | b'\n' | b'\r');
-    bytes.len() >= MIN_STRIPPED && !bytes.iter().any(is_lost)
+    bytes.len() >= MIN_STRIPPED && !bytes.is_ascii() && !bytes.iter().any(is_lost)
 }
 
-fn check_files(files: &[Bytes], max_files: usize) -> Result<(), Problem> {
+fn check_files<S: Settings>(files: &[Bytes], max_files: usize) -> Result<(), Problem> {
     if files.len() > max_files {
         return Err(Problem::too_many_frames(max_files));
     }

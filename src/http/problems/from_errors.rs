@@ -61,6 +61,9 @@ fn unread(name: &str) -> String {
         "text" => {
             "With curl the name of a file has an `@` before it: `--data-binary @file`, `-F frame=@file`."
         }
+        "base64" => {
+            "Send the bytes of the file itself (`curl --data-binary @file`), or base64 in the field `frame` of JSON."
+        }
         "gzip" | "ZIP" => "Send the file itself, not packed.",
         _ => "Convert it, or let the camera or the browser make JPEGs.",
     };

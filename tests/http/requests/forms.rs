@@ -344,6 +344,14 @@ async fn a_file_that_curl_sent_as_text_is_recognised() {
     // The `@` was left out.
     let name = send(b"clip/img/0001.jpg".to_vec()).await;
     expect_detail(name, "unsupported-image", &["text", "`-F frame=@file`"]).await;
+    // Base64 loses its line breaks, too, and is whole without.
+    let text = BASE64_STANDARD.encode(&frame);
+    let lines: Vec<&[u8]> = text.as_bytes().chunks(76).collect();
+    let url = format!("data:image/png;base64,{text}").into_bytes();
+    for text in [lines.concat(), lines.join(&b'\n'), url] {
+        let says = ["base64", "`curl --data-binary @file`"];
+        expect_detail(send(text).await, "unsupported-image", &says).await;
+    }
     // This is how curl labels a whole file.
     expect(send(frame).await, StatusCode::OK).await;
 }
