@@ -38,6 +38,7 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
+    own_new_files();
     let log = Log::start(&args.log, args.log_format)?;
     variables::check(&super::command());
     let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -49,6 +50,20 @@ pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
     runtime.shutdown_background();
     result
 }
+
+/// Files that the process makes are for its own user alone: states of sessions have parts of the pictures in them, and
+/// the folder of a store may be one that others look into.
+#[cfg(unix)]
+fn own_new_files() {
+    use rustix::fs::Mode;
+    use rustix::process::umask;
+    let others = Mode::RWXG | Mode::RWXO;
+    let before = umask(others);
+    umask(before | others);
+}
+
+#[cfg(not(unix))]
+fn own_new_files() {}
 
 async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     open_files::fit(&mut config);

@@ -136,3 +136,31 @@ fn settings_that_cannot_work_are_refused_with_what_would() {
         assert!(said.contains("hosts like example.org"), "{said}");
     }
 }
+
+/// The folder of a store may have been made by somebody else, for all to look into.
+#[cfg(unix)]
+#[test]
+fn files_of_a_store_are_for_the_user_of_the_process_alone() {
+    use std::fs::Permissions;
+    use std::os::unix::fs::PermissionsExt;
+    let parent = folder();
+    let store = parent.path().join("sessions");
+    fs::create_dir(&store).expect("it is new");
+    fs::set_permissions(&store, Permissions::from_mode(0o755)).expect("it is ours");
+    let (_service, _) = start(&["--store", &format!("file:{}", text(&store))]);
+    let mut folders = vec![store];
+    let mut files = 0;
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            let about = fs::metadata(&path).expect("it is there");
+            let mode = about.permissions().mode() & 0o777;
+            assert_eq!(mode & 0o077, 0, "{mode:o} {}", path.display());
+            match about.is_dir() {
+                true => folders.push(path),
+                false => files += 1,
+            }
+        }
+    }
+    assert!(files > 3, "{files}");
+}
