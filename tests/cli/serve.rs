@@ -135,6 +135,11 @@ fn settings_that_cannot_work_are_refused_with_what_would() {
         let said = refusal(&["--allowed-hosts", hosts]);
         assert!(said.contains("hosts like example.org"), "{said}");
     }
+    // Of the second the host was taken to be `ss`.
+    for store in ["redis://:pa#ss@localhost", "redis://user:pa@ss#w@localhost"] {
+        let said = refusal(&["--store", store]);
+        assert!(said.contains("`%23`") && !said.contains("ss@"), "{said}");
+    }
 }
 
 /// The folder of a store may have been made by somebody else, for all to look into.

@@ -47,7 +47,7 @@ impl StoreConfig {
         let held = in_range(
             self.store.is_none() || self.address().is_some(),
             "file:DIR, or an address like redis://localhost:6379, which is in builds with the feature redis, and rediss \
-             in those with tls",
+             in those with tls; a password has `/`, `?`, `#`, `@` and `%` as `%2F`, `%3F`, `%23`, `%40` and `%25`",
         );
         ConfigError::check("store", held)
     }

@@ -40,6 +40,11 @@ impl RedisAddress {
             };
             RedisAddressError(format!("no address of a store: {reason}"))
         };
+        // What follows would be dropped, with the host in it.
+        if text.contains('#') {
+            let reason = "no address of a store: a `#` in a password is written `%23`";
+            return Err(RedisAddressError(reason.to_owned()));
+        }
         let Some((scheme, rest)) = text.split_once("-cluster://") else {
             let client = Client::open(text).map_err(failed)?;
             return Ok(Self(Kind::Server(Box::new(client))));
@@ -97,6 +102,9 @@ mod tests {
             "localhost:6379",
             "http://localhost",
             "redis://:secret@a:port",
+            "redis://:secret#@localhost",
+            "redis://user:secret@b#c@localhost",
+            "redis-cluster://:secret#@a:7000,b:7001",
             "",
         ] {
             let error = parse(text).unwrap_err().to_string();
