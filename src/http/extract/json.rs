@@ -95,7 +95,7 @@ pub(super) fn read<S: Settings>(
                 fields.snapshot = Some(decode(&text(&name, value)?)?);
             }
             "frames" if S::FRAMES == FrameCount::Several => {
-                for text in frames(value, max_files)? {
+                for text in frames::<S>(value, max_files)? {
                     fields.files.push(decode(&text)?);
                 }
             }
@@ -113,11 +113,11 @@ pub(super) fn read<S: Settings>(
     Ok(())
 }
 
-fn frames(value: &RawValue, max_files: usize) -> Result<Vec<Cow<'_, str>>, Problem> {
+fn frames<S: Settings>(value: &RawValue, max_files: usize) -> Result<Vec<Cow<'_, str>>, Problem> {
     // Two quotes a string: base64 has none of its own.
     let quotes = value.get().bytes().filter(|byte| *byte == b'"').count();
     if quotes > 2 * max_files {
-        return Err(Problem::too_many_frames(max_files));
+        return Err(Problem::too_many_frames::<S>(max_files));
     }
     serde_json::from_str(value.get())
         .map_err(|_| Problem::malformed("`frames` must be an array of base64 strings."))

@@ -133,7 +133,7 @@ pub(super) async fn read<S: Settings>(
             let file = read_part(part, &progress, max_bytes, max_bytes, charge).await?;
             fields.files.push(file);
         } else {
-            return Err(Problem::too_many_frames(max_files));
+            return Err(Problem::too_many_frames::<S>(max_files));
         }
     }
     Ok(())

@@ -90,7 +90,7 @@ impl<S: Settings> Upload<S> {
             snapshot,
             texts: of_body,
         } = fields;
-        check_files(&files, max_files)?;
+        check_files::<S>(&files, max_files)?;
         let formats = files.iter().map(|file| video_format(file, &media_type));
         let video = formats.flatten().next();
         if video.is_some() && (!S::TAKES_VIDEO || files.len() > 1) {
@@ -185,7 +185,7 @@ fn is_stripped(bytes: &[u8]) -> bool {
 
 fn check_files<S: Settings>(files: &[Bytes], max_files: usize) -> Result<(), Problem> {
     if files.len() > max_files {
-        return Err(Problem::too_many_frames(max_files));
+        return Err(Problem::too_many_frames::<S>(max_files));
     }
     if files.is_empty() {
         return Err(Problem::missing_frame());

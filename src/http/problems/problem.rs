@@ -2,6 +2,7 @@
 
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
+use bagtrack_api::requests::{FrameCount, Settings};
 use bagtrack_api::{ProblemDocument, ProblemKind as Kind};
 use std::error::Error;
 use std::sync::Arc;
@@ -114,11 +115,22 @@ impl Problem {
         Self::new(Kind::RequestTooCostly, detail)
     }
 
-    /// The request has more frames than it may.
-    pub fn too_many_frames(limit: usize) -> Self {
-        let detail = format!(
-            "A request may have at most {limit} frames here; send the rest in another one."
-        );
+    /// The request has more frames than a call with these settings takes, `limit` where that is several.
+    pub fn too_many_frames<S: Settings>(limit: usize) -> Self {
+        let detail = match (S::FRAMES, S::TAKES_VIDEO) {
+            (FrameCount::Several, _) => format!(
+                "A request may have at most {limit} frames here (`--max-frames`); send the rest in another one."
+            ),
+            (FrameCount::One, true) => {
+                "This call takes one video; send each of the others in a request of its own."
+                    .to_owned()
+            }
+            (FrameCount::One, false) => {
+                "This call takes one frame: send the first one alone, then those after it to \
+                    `POST /sessions/{id}/frames`."
+                    .to_owned()
+            }
+        };
         Self::new(Kind::TooManyFrames, detail)
     }
 

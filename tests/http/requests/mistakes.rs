@@ -136,6 +136,38 @@ async fn a_box_that_reaches_far_outside_is_tracked_with_a_warning() {
 }
 
 #[tokio::test]
+async fn several_frames_for_a_call_that_takes_one_are_told_where_the_others_go() {
+    let app = TestApplication::start_with(|config| config.max_frames = 3).await;
+    let id = app.open().await;
+    let frame = |number| Part::bytes(pictures::png(number)).file_name("frame.png");
+    let send = async |method: Method, path: &str, count: u32| {
+        let form = (0..count).fold(Form::new(), |form, number| {
+            form.part("frame", frame(number))
+        });
+        let query = [("box", BOX)];
+        let query = if path == "/frames" { &[] } else { &query[..] };
+        let request = app.request(method, path, query);
+        request.multipart(form).send().await.unwrap()
+    };
+    let target = format!("/sessions/{id}/target");
+    let alone = [
+        "one frame",
+        "first one alone",
+        "`POST /sessions/{id}/frames`",
+    ];
+    for (method, path) in [(Method::POST, "/sessions"), (Method::PUT, &target)] {
+        let refused = send(method, path, 2).await;
+        expect_detail(refused, "too-many-frames", &alone).await;
+    }
+    let videos = send(Method::POST, "/frames", 2).await;
+    expect_detail(videos, "too-many-frames", &["one video"]).await;
+    let track = send(Method::POST, "/track", 4).await;
+    let rest = ["at most 3 frames", "`--max-frames`", "the rest in another"];
+    expect_detail(track, "too-many-frames", &rest).await;
+    assert_eq!(app.frames_of(&id).await, 1);
+}
+
+#[tokio::test]
 async fn a_url_in_place_of_base64_is_named() {
     let app = TestApplication::start().await;
     for url in [
