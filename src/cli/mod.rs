@@ -68,7 +68,7 @@ enum Command {
 /// The commands. The settings of the service are in the help of `serve` only, so that the first help fits a screen.
 fn command() -> clap::Command {
     let command = Cli::command().mut_args(|arg| arg.hide(true));
-    command.after_help(AFTER)
+    variables::without_empty(command.after_help(AFTER))
 }
 
 /// Reads the command line.

@@ -117,9 +117,15 @@ fn a_session_of_several_targets_gets_the_answers_that_track_gives() {
 
 /// What the program says where it does not start with these flags.
 fn refusal(flags: &[&str]) -> String {
+    refusal_with(flags, &[])
+}
+
+/// The same, with variables of the environment.
+fn refusal_with(flags: &[&str], variables: &[(&str, &str)]) -> String {
     let mut command = program::serve(&bagtrack_testing::command::program("bagtrack"));
-    match Program::spawn(command.args(flags)) {
-        Ok(_) => panic!("{flags:?} is taken"),
+    let command = command.args(flags).envs(variables.iter().copied());
+    match Program::spawn(command) {
+        Ok(_) => panic!("{flags:?} {variables:?} is taken"),
         Err(error) => error.to_string(),
     }
 }
@@ -139,6 +145,27 @@ fn settings_that_cannot_work_are_refused_with_what_would() {
     for store in ["redis://:pa#ss@localhost", "redis://user:pa@ss#w@localhost"] {
         let said = refusal(&["--store", store]);
         assert!(said.contains("`%23`") && !said.contains("ss@"), "{said}");
+    }
+}
+
+/// Charts and compose files pass variables that nobody gave.
+#[test]
+fn an_empty_variable_counts_as_not_set_but_for_those_of_access() {
+    let empty = [
+        ("BAGTRACK_WORKERS", ""),
+        ("BAGTRACK_TLS_CERT", ""),
+        ("BAGTRACK_STORE", ""),
+        ("BAGTRACK_MODEL_IN_DOUBT", ""),
+        ("BAGTRACK_LOG_FORMAT", ""),
+    ];
+    let mut service = Program::start(&[], &empty);
+    service.logs("in a browser");
+    let said = service.said().join("\n");
+    assert!(!said.contains("is no setting"), "{said}");
+    for name in ["api-keys", "api-keys-file", "metrics-key"] {
+        let variable = format!("BAGTRACK_{}", name.replace('-', "_").to_uppercase());
+        let said = refusal_with(&[], &[(&variable, "")]);
+        assert!(said.contains(&format!("--{name}")), "{said}");
     }
 }
 
