@@ -20,7 +20,7 @@ async function fetched(address) {
 /** @param {string} name */
 export async function openClip(name) {
   const source = new Stills(name, FRAMES_A_SECOND, async (index) => (await fetched(`./sample/${name}/${index}.jpg`)).blob());
-  source.isPaced = true;
+  source.isPaced = source.isFetched = true;
   const first = source.ahead(0);
   const clip = await (await fetched(`./sample/${name}/clip.json`)).json();
   source.count = clip.truth.length;

@@ -6,7 +6,7 @@ import { button, canvas, get, input } from "./dom.js";
 import { DRAW, Editing, TAP, again } from "./editing.js";
 import { LocalClient } from "./js/local.js";
 import { Problem } from "./js/problem.js";
-import { FOLLOWING, Message } from "./message.js";
+import { FOLLOWING, GO_ON, Message } from "./message.js";
 import { Player } from "./player.js";
 import { UnplayableError, words } from "./problems.js";
 import { prepareSaving } from "./saving.js";
@@ -119,28 +119,31 @@ export class Page {
   }
 
   /** @param {unknown} error
-   * @param {() => void} [again] Makes it anew, with a key. */
-  fail(error, again) {
+   * @param {() => void} [again] Makes it anew, with a key.
+   * @param {string} [way] What one can do without one. */
+  fail(error, again, way = "") {
     this.again = again;
-    if (error instanceof Problem && error.slug === "unauthorized") {
+    const wantsKey = error instanceof Problem && error.slug === "unauthorized";
+    if (wantsKey) {
       get("key-form").hidden = false;
       get("key").focus();
     }
-    this.say(words(error, this.hasKey), true);
+    this.say(words(error, this.hasKey) + (wantsKey ? "" : way), true);
     const hasEnded = this.run?.isResting && !this.run.wake;
     if (!hasEnded || !this.hasRows) return;
     this.enter("ended");
     this.changed();
   }
 
-  /** What tracks has failed: one can go on where that stood.
+  /** What tracks has failed, or the line that frames come over: one can go on where that stood.
    * @param {unknown} error */
   rest(error) {
     this.letGoOn();
     this.enter("ended");
     this.repaint();
     this.changed();
-    this.fail(error, this.canGoOn ? () => this.player.goOn() : undefined);
+    if (this.canGoOn) this.fail(error, () => this.player.goOn(), GO_ON);
+    else this.fail(error, undefined, " Choose the video or the camera again.");
   }
 
   /** Shows the first frame of a source and asks for a box. What was there before stays until then.

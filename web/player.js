@@ -2,7 +2,7 @@
 
 import { button } from "./dom.js";
 import { close } from "./frames.js";
-import { FOLLOWING } from "./message.js";
+import { FOLLOWING, GO_ON } from "./message.js";
 
 export class Player {
   /** @param {import("./page.js").Page} page */
@@ -44,7 +44,7 @@ export class Player {
     } catch (error) {
       if (run !== page.run) return;
       page.enter(state);
-      page.fail(error, () => this.goOn());
+      page.fail(error, () => this.goOn(), GO_ON);
     }
   }
 

@@ -6,8 +6,8 @@ import { Problem } from "./js/problem.js";
 const WORDS = {
   unreachable: "The service cannot be reached. Is it still running?",
   unauthorized: "The service does not know this key.",
-  "session-expired": "The session has expired: no frame came for too long. Choose the video or the camera again.",
-  "session-not-found": "The service has lost the session. Choose the video or the camera again.",
+  "session-expired": "The session has expired: no frame came for too long.",
+  "session-not-found": "The session is lost.",
   "queue-full": "The service is busy. Try again in a moment.",
   "too-many-sessions": "The service is busy: it follows as many targets as it can. Try again in a moment.",
   "quota-exceeded": "You have as many sessions or frames under way as one client may. Try again in a moment.",

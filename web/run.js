@@ -17,7 +17,7 @@ import { FollowedObject } from "./objects.js";
  * @property {(picture: Picture, answer: Answer | undefined) => void} answer A frame is answered: what was answered for the
  *   chosen object.
  * @property {(error: unknown) => void} fail The source fails: it has no more frames that can be had.
- * @property {(error: unknown) => void} rest What tracks fails. One can go on where that stood.
+ * @property {(error: unknown) => void} rest What tracks fails, or the line to the source. One can go on from there.
  * @property {(error: unknown) => void} refuse A box that was drawn cannot be followed. Nothing has changed.
  * @property {(isUp: boolean) => void} line
  * @property {() => void} anew The service had lost a session: another one goes on from the last box.
@@ -284,7 +284,8 @@ export class Run {
    * @param {unknown} failure */
   end(failure) {
     this.rest();
-    this.told.fail(failure);
+    if (this.source.isFetched) this.told.rest(failure);
+    else this.told.fail(failure);
   }
 
   /** @param {unknown} error */

@@ -31,6 +31,7 @@ export class Stills {
     this.loaded = new Map();
     /** The one that was delivered last. */
     this.index = 0;
+    this.isFetched = false;
     /** Whether frames come at their rate. Else they come as fast as they can be tracked, in a hidden tab too. */
     this.isPaced = false;
     this.isHeld = false;

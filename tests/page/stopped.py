@@ -3,7 +3,20 @@
 import pathlib
 import re
 
-from browser import choose, drag, frames, kept_rows, near, numbers, rows, said, slow, to_the_end, was_said
+from browser import (
+    choose,
+    drag,
+    frames,
+    kept_rows,
+    near,
+    numbers,
+    rows,
+    said,
+    say_nothing,
+    slow,
+    to_the_end,
+    was_said,
+)
 from clips import FRAMES, H264
 from files import check_distance, choose_file, sent_box
 from service import Service
@@ -228,6 +241,64 @@ def offline(checks):
     page.context.close()
 
 
+def sample_broken_off(checks):
+    """A sample whose frames do not come any more, as when the service has gone, goes on when they do; until then the
+    page says that one may try again."""
+    for where in ("here", "there"):
+        page = checks.page(where=where, allowed=("Failed to load",))
+        missing = "**/sample/card/*"
+        choose(page, "card")
+        drag(page, checks.clips["card"]["truth"][0])
+        frames(page, 40)
+        page.route(missing, lambda route: route.abort())
+        said(page, 'Press "Go on" to try again')
+        before = kept_rows(page)
+        assert len(before) < 150, "it has ended before the line broke"
+        say_nothing(page)
+        page.locator("#resume").click()
+        said(page, 'Press "Go on" to try again')
+        page.unroute(missing)
+        page.locator("#resume").click()
+        to_the_end(page)
+        table = rows(page)
+        assert [int(row["frame"]) for row in table] == list(range(150)) and values(table[: len(before)]) == values(before)
+        page.context.close()
+
+
+WORKERS = """() => {
+    const Own = Worker;
+    window.end = () => undefined;
+    window.Worker = class extends Own {
+        constructor(...given) {
+            super(...given);
+            window.end = () => {
+                this.terminate();
+                this.dispatchEvent(new ErrorEvent("error", { message: "It has no more memory." }));
+            };
+        }
+    };
+}"""
+
+
+def worker_ended(checks):
+    """Where the browser ends what tracks in the page, the page says so, and goes on from there."""
+    page = checks.page(where="here")
+    page.evaluate(WORKERS)
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 40)
+    page.evaluate("window.end()")
+    page.locator("#message.bad").filter(has_text='Press "Go on" to try again').wait_for()
+    told = page.locator("#message").inner_text()
+    assert "service" not in told and "Choose" not in told, told
+    before = kept_rows(page)
+    page.locator("#resume").click()
+    to_the_end(page)
+    table = rows(page)
+    assert [int(row["frame"]) for row in table] == list(range(150)) and values(table[: len(before)]) == values(before)
+    page.context.close()
+
+
 def drawn_before_it_is_shown(checks):
     """A box that is drawn while the frame where to begin is on its way is of the one that is still shown."""
     page = checks.page(where="here")
@@ -285,6 +356,8 @@ ALL = [
     failed_after_it_was_left,
     no_session_is_left,
     offline,
+    sample_broken_off,
+    worker_ended,
     drawn_before_it_is_shown,
     played_again,
 ]
