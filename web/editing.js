@@ -156,7 +156,8 @@ export class Editing {
     try {
       const name = await this.undoing.undo(run);
       if (run !== this.page.run) return;
-      this.page.say(name ? `The last change to ${name} is undone.` : "There is nothing to undo.");
+      const done = name ? `The last change to ${name} is undone.` : "There is nothing to undo.";
+      this.page.say(done + (run.chosen ? "" : ` ${TAP}${DRAW}`));
       this.page.isUnsaved = true;
       this.page.repaint();
       this.page.changed();

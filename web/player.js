@@ -1,6 +1,7 @@
 // Going on, pausing, and playing what was tracked.
 
 import { button } from "./dom.js";
+import { DRAW, TAP } from "./editing.js";
 import { close } from "./frames.js";
 import { FOLLOWING, GO_ON } from "./message.js";
 
@@ -35,6 +36,7 @@ export class Player {
     const { page } = this;
     const { run, state } = page;
     if (!run || run.isRedoing || run.isOver) return;
+    if (run.wantsObject) return page.say(`There is no object. ${TAP}${DRAW}`);
     const isStopped = run.wake && state === "ended";
     page.enter("following");
     if (isStopped) page.say(FOLLOWING);

@@ -134,6 +134,7 @@ export class Run {
     this.objects = this.objects.filter((other) => other !== object);
     if (this.chosen === object) this.chosen = this.objects[0];
     if (this.drawn?.object === object) this.drawn = undefined;
+    this.throttle();
   }
 
   follower() {
@@ -147,8 +148,14 @@ export class Run {
     this.throttle();
   }
 
+  /** Whether there is nothing to follow: frames wait for a box. Those of a camera do not, one draws in what it sees. */
+  get wantsObject() {
+    return this.objects.length === 0 && !this.source.isLive;
+  }
+
   get isFull() {
-    return this.isPaused || this.isRedoing || this.drawn !== undefined || this.underWay.length >= WINDOW;
+    const waits = this.isPaused || this.isRedoing || this.drawn !== undefined || this.wantsObject;
+    return waits || this.underWay.length >= WINDOW;
   }
 
   /** @param {Picture} picture */
@@ -162,7 +169,9 @@ export class Run {
       this.underWay = this.underWay.filter((other) => other !== sent);
       // It was on its way when the sessions were ended, and comes again where one goes on.
       if (this.isResting && answers.some((answer) => !answer)) return close(picture);
-      if (objects.length > 0 && answers.every((answer) => !answer)) this.skip(picture);
+      // Those on their way when the last object is deleted are before the next box.
+      const isSkipped = objects.length > 0 && !this.wantsObject && answers.every((answer) => !answer);
+      if (isSkipped) this.skip(picture);
       else this.answered(objects, answers, sent);
     } catch (error) {
       this.underWay = this.underWay.filter((other) => other !== sent);

@@ -3,6 +3,7 @@
 import json
 
 from browser import (
+    DRAW,
     choose,
     drag,
     drawn_frames,
@@ -181,6 +182,40 @@ def deletion_undone(checks):
         page.context.close()
 
 
+def no_object_left(checks):
+    """Once the last object is deleted, frames wait for another box, and "Go on" asks for one. From the box on it goes on
+    as before."""
+    for where in ("here", "there"):
+        page = checks.page(where=where)
+        choose(page, "card")
+        drag(page, checks.clips["card"]["truth"][0])
+        frames(page, 20)
+        page.get_by_role("button", name="Delete Object 1").click()
+        said(page, DRAW)
+        shown = int(page.locator("#frames").inner_text())
+        # Time in which frames would go past.
+        page.wait_for_timeout(1000)
+        drag(page, OFF)
+        frames(page, shown + 20)
+        page.locator("#pause").click()
+        table = kept_rows(page)
+        assert int(table[0]["frame"]) < shown + 10, (shown, table[0])
+        for again, state in (("#pause", "paused"), ("#resume", "ended")):
+            page.get_by_role("button", name="Delete Object").click()
+            page.locator(again).click()
+            said(page, f"There is no object. {DRAW}")
+            page.locator(f"body[data-state={state}]").wait_for()
+            page.locator("#undo").click()
+            said(page, "Object 2 is undone")
+            if state == "paused":
+                page.locator("#stop").click()
+        page.locator("#resume").click()
+        to_the_end(page)
+        rest = [int(row["frame"]) for row in rows(page)]
+        assert rest == list(range(rest[0], 150)) and rest[0] == int(table[0]["frame"]), rest
+        page.context.close()
+
+
 def undone_without_the_service(checks):
     """What cannot be undone while the service is away stays as it is, and is undone when it is back."""
     service = Service(checks.program, **SECRET)
@@ -323,6 +358,7 @@ ALL = [
     undone_while_it_is_followed,
     undone_after_more_frames,
     deletion_undone,
+    no_object_left,
     undone_without_the_service,
     states_of_a_long_video,
     memory_of_steps,
