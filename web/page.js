@@ -183,7 +183,7 @@ export class Page {
       this.beginning.reset();
       this.preview();
       get("picture").scrollIntoView({ block: "nearest" });
-      this.say(TAP + DRAW + this.arrived());
+      this.say(TAP + DRAW + (source.note ?? "") + this.arrived());
     } catch (error) {
       if (own !== this.choice) return;
       if (!this.run) this.enter("start");

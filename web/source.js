@@ -26,6 +26,7 @@
  * @property {(frame: number, time: number) => Promise<Picture>} [at] Any frame again. It works after `stop`, too.
  * @property {() => void} [close] Gives up what `at` needs.
  * @property {(show: (image: HTMLCanvasElement) => void) => void} [preview] Shows what is seen, until `first` is called.
+ * @property {string} [note] What is to be said once it is open.
  * @property {boolean} [isFetched] Whether its frames come over a line: one that fails may come later.
  * @property {boolean} [isAbsent] Whether its pictures are empty: the video of a project is not at hand.
  * @property {File[]} [files] What can be kept of it, so that it can be opened again.

@@ -9,23 +9,25 @@ const modules = () =>
 
 /** @typedef {import("./source.js").Source} Source */
 
-/** Opens what files are: one video, or images.
+/** Opens what files are: one video, or images. Of several videos the first.
  * @param {File[]} files
  * @param {string[]} [names] Of images that have been opened before.
  * @returns {Promise<Source>} */
 export async function openFiles(files, names) {
   const [{ openVideo }, { isImage, openAnimated, openImages }] = await modules();
-  const video = files.find((file) => file.type.startsWith("video/"));
-  if (!video && files.some(isImage)) {
+  const videos = files.filter((file) => file.type.startsWith("video/"));
+  if (videos.length === 0 && files.some(isImage)) {
     const animated = files.length === 1 && !names ? await openAnimated(files[0]) : undefined;
     return animated ?? openImages(files, names);
   }
-  const file = video ?? files[0];
+  const [file, ...others] = videos.length > 0 ? videos : files;
   if (file.size === 0) throw new Error(`${file.name} is empty.`);
-  return openVideo(file, get("stage")).catch((error) => {
+  const source = await openVideo(file, get("stage")).catch((error) => {
     if (error.name !== "NotSupportedError") throw error;
     throw isNoVideo(file) ? new Error(`${file.name} is neither a video nor an image.`) : new UnplayableError(file);
   });
+  if (others.length > 0) source.note = ` Of ${others.length + 1} videos this is ${file.name}: open one at a time.`;
+  return source;
 }
 
 /** Whether a file is by its kind of no use to a decoder. Some systems take an MPEG transport stream for a text.

@@ -86,10 +86,10 @@ def folder_with_a_damaged_image(checks):
         page.context.close()
 
 
-HANDED = """([kind, name, type, content]) => {
+HANDED = """([kind, names, type, content]) => {
     const bytes = Uint8Array.from(atob(content), (sign) => sign.charCodeAt(0));
     const data = new DataTransfer();
-    data.items.add(new File([bytes], name, { type }));
+    for (const name of names) data.items.add(new File([bytes], name, { type }));
     const event = kind === "paste"
         ? new ClipboardEvent("paste", { clipboardData: data, bubbles: true })
         : new DragEvent("drop", { dataTransfer: data, bubbles: true, cancelable: true });
@@ -102,8 +102,11 @@ def dropped_and_pasted(checks):
     content = base64.b64encode(path.read_bytes()).decode()
     for kind in ("drop", "paste"):
         page = checks.page(where="here")
-        page.evaluate(HANDED, [kind, path.name, "video/webm", content])
+        page.evaluate(HANDED, [kind, [path.name], "video/webm", content])
         said(page, DRAW)
+        assert path.name not in page.locator("#message").inner_text()
+        page.evaluate(HANDED, [kind, ["one.webm", "two.webm"], "video/webm", content])
+        said(page, "Of 2 videos this is one.webm: open one at a time.")
         page.context.close()
 
 
