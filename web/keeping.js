@@ -213,7 +213,8 @@ export class Keeping {
       return Object.assign(await openFiles(files, imageNames), { name: project.video.name, imageNames });
     };
     // Another tab may have it open where browsers do not tell: then this one has a copy.
-    await this.open(project, open, states, isOwn || navigator.locks ? id : undefined);
+    const own = isOwn || navigator.locks ? id : undefined;
+    await this.page.choose(open, (run) => this.resume(run, project, states, own));
     if (this.id !== id) giveUp(id);
   }
 
@@ -249,24 +250,15 @@ export class Keeping {
   /** @param {File} file
    * @param {File[]} files Of its video. */
   async openProject(file, files) {
-    try {
+    /** @type {Project} */
+    let project;
+    // Reads it as a source is opened: a choice that overtakes it says what is said.
+    const open = async () => {
       const { fitting, readProject, withoutVideo } = await projects();
-      const project = readProject(JSON.parse(await file.text()));
-      const open = async () => (files.length > 0 ? fitting(await openFiles(files), project) : withoutVideo(project));
-      await this.open(project, open);
-    } catch (error) {
-      this.page.say(error instanceof SyntaxError ? `${file.name} is no JSON.` : String(Object(error).message), true);
-    }
-  }
-
-  /**
-   * @param {Project} project
-   * @param {() => Promise<Source>} open
-   * @param {Kept["states"]} [states]
-   * @param {string} [id] Its entry.
-   */
-  open(project, open, states = {}, id) {
-    return this.page.choose(open, (run) => this.resume(run, project, states, id));
+      project = readProject(parsed(await file.text(), file.name));
+      return files.length > 0 ? fitting(await openFiles(files), project) : withoutVideo(project);
+    };
+    await this.page.choose(open, (run) => this.resume(run, project, {}));
   }
 
   /** Brings what was tracked into a run.
@@ -294,6 +286,16 @@ export class Keeping {
     this.page.say(`${source.name} is here again, with ${run.tracked} frames.${source.isAbsent ? wanted : ""}${left}`);
     this.changed();
     return true;
+  }
+}
+
+/** @param {string} text
+ * @param {string} name */
+function parsed(text, name) {
+  try {
+    return JSON.parse(text);
+  } catch {
+    throw new Error(`${name} is no JSON.`);
   }
 }
 

@@ -293,6 +293,40 @@ def half_tracked_project(checks):
     page.context.close()
 
 
+READ_LATE = """() => {
+    const own = Blob.prototype.text;
+    let isRead;
+    const done = new Promise((resolve) => (isRead = resolve));
+    const released = new Promise((resolve) => {
+        window.release = () => {
+            resolve();
+            return done;
+        };
+    });
+    Blob.prototype.text = async function () {
+        await released;
+        const text = await own.call(this);
+        setTimeout(isRead);
+        return text;
+    };
+}"""
+
+
+def refused_project_overtaken(checks):
+    """A project is refused with a reason; where a video was chosen meanwhile, nothing is said of it."""
+    path = checks.files.folder / "torn.bagtrack.json"
+    path.write_text("{")
+    page = checks.page(where="here")
+    page.locator("#file").set_input_files(path)
+    said(page, "torn.bagtrack.json is no JSON.")
+    page.evaluate(READ_LATE)
+    page.locator("#file").set_input_files(path)
+    choose_file(page, checks.files.file("clip.mp4", 30, H264))
+    page.evaluate("() => window.release()")
+    assert page.locator("#message").inner_text().startswith(DRAW), page.locator("#message").inner_text()
+    page.context.close()
+
+
 MANY = 10_000
 """Frames, each with a row of 16 objects: more rows than arguments that a browser takes."""
 
@@ -402,6 +436,7 @@ def project_without_its_video(checks):
 
 ALL = [
     half_tracked_project,
+    refused_project_overtaken,
     project_of_many_rows,
     nothing_may_be_kept,
     last_object_deleted,
