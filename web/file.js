@@ -6,7 +6,7 @@
 
 import { Delivery } from "./delivery.js";
 import { BEFORE, Gaps, SAME_PASSES } from "./gaps.js";
-import { Playback, SAME, areEqual, learnRate } from "./playback.js";
+import { Playback, SAME, areEqual, isEmpty, learnRate } from "./playback.js";
 import { addVideo, drawFrame, encoded, loaded } from "./source.js";
 
 /**
@@ -81,7 +81,11 @@ export class VideoFile {
   async first() {
     const shown = await this.playback.seek(0);
     this.firstTime = shown?.mediaTime ?? 0;
-    return this.begin(0, this.firstTime, shown);
+    const picture = await this.begin(0, this.firstTime, shown);
+    // Some browsers say that they can play what has no whole frame, and show nothing.
+    if (shown || !isEmpty(this.lastImage)) return picture;
+    this.close();
+    throw new Error(`${this.name} is cut in its first frame: there is no picture in it. Choose another copy of it.`);
   }
 
   /** Begins at a time. What is not played has no number: it is counted from the rate of the file's first frames.

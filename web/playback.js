@@ -59,6 +59,13 @@ export function areEqual(one, other) {
   return a.every((pixel, at) => pixel === b[at]);
 }
 
+/** Whether nothing was drawn: what a video shows is opaque.
+ * @param {HTMLCanvasElement | undefined} image */
+export function isEmpty(image) {
+  const data = image?.getContext("2d")?.getImageData(0, 0, image.width, image.height).data;
+  return !data?.some((value) => value > 0);
+}
+
 /** Frames that tell the rate. */
 const TELLING = 9;
 /** How long they may take, in milliseconds. */

@@ -107,6 +107,20 @@ def cut_file(checks):
         page.context.close()
 
 
+def cut_in_its_first_frame(checks):
+    """A recording that broke off before it has a picture is refused with a reason, and the page goes on."""
+    page = checks.page(where="here")
+    for name, rate, codec in (("whole.mkv", 30, H264), ("whole.webm", 25, VP8)):
+        whole = checks.files.file(name, rate, codec).read_bytes()
+        path = checks.files.folder / f"begun-{name}"
+        path.write_bytes(whole[:5000])
+        page.locator("#file").set_input_files(path)
+        said(page, f"{path.name} is cut in its first frame")
+        assert page.locator("#stage video").count() == 0
+        choose_file(page, checks.files.file("clip.mp4", 30, H264))
+    page.context.close()
+
+
 def whole_file(checks, path, rate):
     page = checks.page()
     follow_file(checks, page, path)
@@ -253,6 +267,7 @@ ALL = [
     h264_file,
     vp8_file,
     cut_file,
+    cut_in_its_first_frame,
     file_of_varying_rate,
     file_of_a_phone,
     file_with_corrections,
