@@ -129,7 +129,7 @@ export class FrameStream {
     return new Promise((resolve, reject) => {
       const own = frameOf(frame);
       const header = { box: box == null ? undefined : boxOf(box), see };
-      if (this.live) this.skip();
+      if (this.live) this.skip(box != null);
       this.waiting.push({ frame: own, header, resolve, reject });
       if (this.lost) {
         // It was lost while there was nothing to send.
@@ -139,11 +139,15 @@ export class FrameStream {
     });
   }
 
-  /** Of live frames that cannot be sent yet, the newest is kept. */
-  skip() {
+  /** Of live frames that cannot be sent yet, the newest is kept. One with a box is skipped for another one with a box.
+   * @param {boolean} hasBox Whether the newest has one. */
+  skip(hasBox) {
     // One that is being read is as good as sent: where reading takes longer than the next frame, none would be.
     const unsent = Math.max(this.sent, this.waiting.findIndex((other) => other === this.reading) + 1);
-    this.waiting.splice(unsent).forEach((older) => older.resolve(undefined));
+    for (const older of this.waiting.splice(unsent)) {
+      if (older.header.box && !hasBox) this.waiting.push(older);
+      else older.resolve(undefined);
+    }
   }
 
   /** Ends the stream; the session goes on. Nobody is told the answers to frames on their way, but those frames count. */

@@ -150,6 +150,18 @@ test("of live frames one that takes long to be read is not skipped for ever", as
   stream.close();
 });
 
+test("of live frames one with a box is skipped only for another one with a box", async () => {
+  const session = await open();
+  const [wrong, right] = [{ x: 10, y: 20, width: 40, height: 40 }, { x: 60, y: 20, width: 40, height: 40 }];
+  // All wait until the line is up.
+  const stream = session.stream({ live: true });
+  const headers = [{}, { box: wrong }, { box: right }, {}, {}];
+  const answers = await Promise.all(headers.map((header, at) => stream.track(clip.frames[at + 1], header)));
+  assert.deepEqual(answers.map((answer) => answer?.frame), [undefined, undefined, 1, undefined, 2]);
+  assert.ok(Math.abs((answers[2]?.box.x ?? 0) - right.x) < 2, JSON.stringify(answers[2]));
+  stream.close();
+});
+
 test("what is no answer of the service ends the stream, and is told", async () => {
   for (const message of ["<html>", '{"ok": true}', "null", '{"frame": 1}']) {
     class Other extends WebSocket {

@@ -100,8 +100,9 @@ export declare class FrameStream {
         box?: import("./session.js").Box;
         see?: boolean;
     }): Promise<StreamAnswer | undefined>;
-    /** Of live frames that cannot be sent yet, the newest is kept. */
-    skip(): void;
+    /** Of live frames that cannot be sent yet, the newest is kept. One with a box is skipped for another one with a box.
+     * @param {boolean} hasBox Whether the newest has one. */
+    skip(hasBox: boolean): void;
     /** Ends the stream; the session goes on. Nobody is told the answers to frames on their way, but those frames count. */
     close(): void;
     transmit(): Promise<void> | undefined;
