@@ -57,8 +57,8 @@ export class Run {
     this.failure = undefined;
     /** @type {{picture: Picture, at: number}[]} Frames without an answer, oldest first. */
     this.underWay = [];
-    /** @type {{box: Box, object: FollowedObject | undefined} | undefined} A box that was drawn, until the frames on their
-     * way are answered: for an object, or for a new one. */
+    /** @type {{box: Box, object: FollowedObject | undefined, isSent?: boolean} | undefined} A box that was drawn, until
+     * it is answered: for an object, or for a new one. It is sent once the frames on their way are answered. */
     this.drawn = undefined;
     /** @type {(() => Promise<void>) | undefined} Goes on with a run that was brought back, or stopped. */
     this.wake = undefined;
@@ -154,8 +154,8 @@ export class Run {
   }
 
   get isFull() {
-    const waits = this.isPaused || this.isRedoing || this.drawn !== undefined || this.wantsObject;
-    return waits || this.underWay.length >= WINDOW;
+    const hasBox = this.drawn !== undefined && !this.drawn.isSent;
+    return this.isPaused || this.isRedoing || hasBox || this.wantsObject || this.underWay.length >= WINDOW;
   }
 
   /** @param {Picture} picture */
@@ -244,8 +244,12 @@ export class Run {
     this.underWay.push(sent);
     let isLeft = false;
     try {
+      // Until then no frame is sent: a new object would not know it. A correction is tracked before those behind it.
       if (!object) await this.add(box);
-      const answer = await object?.follower.track(picture, { box });
+      const asked = object?.follower.track(picture, { box });
+      drawn.isSent = asked !== undefined;
+      this.throttle();
+      const answer = await asked;
       if (object && answer) {
         this.note(object, answer, picture, true);
         this.told.answer(picture, answer);
@@ -259,7 +263,8 @@ export class Run {
       isLeft = !isRefused;
     }
     this.underWay = this.underWay.filter((other) => other !== sent);
-    // Until here no frame is sent: a new object would not know it. What is left comes again where one goes on.
+    // What is left comes again where one goes on.
+    drawn.isSent = false;
     if (this.drawn === drawn && !isLeft) this.drawn = undefined;
     if (isLeft) this.throttle();
     else this.sendDrawn();

@@ -284,6 +284,37 @@ def memory_of_steps(checks):
     page.context.close()
 
 
+CAMERA = """async () => {
+    const { Run } = await import("/page/run.js");
+    const sent = [];
+    const track = (_, header) => new Promise((answer) => sent.push({ header, answer }));
+    const [box, nothing] = [{ x: 1, y: 1, width: 8, height: 8 }, () => undefined];
+    const stream = { ended: new Promise(nothing), close: nothing, track };
+    const client = { open: async () => ({ box, stream: () => stream, end: async () => undefined }) };
+    let deliver;
+    const start = (give) => new Promise(() => (deliver = give));
+    const source = { isLive: true, size: { width: 10, height: 10 }, skipped: 0, start, hold: nothing, stop: nothing };
+    const picture = (frame) => ({ frame, time: frame, blob: new Blob(), image: { width: 10, height: 10 } });
+    const told = { answer: nothing, fail: nothing, rest: nothing, refuse: nothing, line: nothing, anew: nothing };
+    const run = new Run(client, source, picture(0), told);
+    await run.begin(box);
+    run.draw(box, run.chosen);
+    [1, 2].forEach((frame) => deliver(picture(frame)));
+    const boxes = sent.map(({ header }) => header.box !== undefined);
+    sent.forEach(({ answer }, frame) => answer({ frame, box, score: 1, status: "tracking" }));
+    await new Promise((resolve) => setTimeout(resolve));
+    return [boxes, [...run.chosen.rows.values()].map(({ frame, corrected }) => [frame, corrected]), run.skipped, run.isFull];
+}"""
+
+
+def corrected_on_camera(checks):
+    """Frames of a camera follow a correction at once: none is skipped while it is on its way."""
+    page = checks.page()
+    told = page.evaluate(CAMERA)
+    assert told == [[True, False, False], [[0, True], [1, False], [2, False]], 0, False], told
+    page.context.close()
+
+
 def added_over_a_slow_line(checks):
     """No frame goes past an object while its session is opened: it has a row of each frame from its box on."""
     page = checks.page()
@@ -362,6 +393,7 @@ ALL = [
     undone_without_the_service,
     states_of_a_long_video,
     memory_of_steps,
+    corrected_on_camera,
     added_over_a_slow_line,
     box_at_the_edge,
     refused_box,
