@@ -65,7 +65,8 @@ export class Keeping {
     if (!run) return false;
     try {
       if (run.objects.length === 0) return await this.keepNothing();
-      const project = (await projects()).projectOf(run);
+      const { projectOf, statesOf } = await projects();
+      const project = projectOf(run);
       const { isLocal, source } = run;
       const files = this.source === source ? undefined : smallFiles(source);
       const clip = clipOf(source);
@@ -222,43 +223,7 @@ export class Keeping {
    * @param {File[]} files
    * @returns {Promise<boolean>} Whether it did. */
   async take(files) {
-    const file = await (await projects()).projectIn(files);
-    const { run } = this.page;
-    if (file) await this.openProject(file, files.filter((other) => other !== file));
-    else if (run?.source.isAbsent && !run.source.isLive) await this.takeVideo(run, files);
-    else return false;
-    return true;
-  }
-
-  /** Takes the video of a project that was opened without; opens another one for itself.
-   * @param {Run} run
-   * @param {File[]} files */
-  async takeVideo(run, files) {
-    const { fitting, projectOf, unlike } = await projects();
-    const project = projectOf(run);
-    const states = statesOf(run);
-    const { id } = this;
-    const open = async () => {
-      const source = await openFiles(files);
-      return source.name === project.video.name ? fitting(source, project) : source;
-    };
-    const resume = async (/** @type {Run} */ opened) =>
-      !unlike(opened.source, project) && this.resume(opened, project, states, id);
-    await this.page.choose(open, resume);
-  }
-
-  /** @param {File} file
-   * @param {File[]} files Of its video. */
-  async openProject(file, files) {
-    /** @type {Project} */
-    let project;
-    // Reads it as a source is opened: a choice that overtakes it says what is said.
-    const open = async () => {
-      const { fitting, readProject, withoutVideo } = await projects();
-      project = readProject(parsed(await file.text(), file.name));
-      return files.length > 0 ? fitting(await openFiles(files), project) : withoutVideo(project);
-    };
-    await this.page.choose(open, (run) => this.resume(run, project, {}));
+    return (await projects()).take(this, files);
   }
 
   /** Brings what was tracked into a run.
@@ -289,16 +254,6 @@ export class Keeping {
   }
 }
 
-/** @param {string} text
- * @param {string} name */
-function parsed(text, name) {
-  try {
-    return JSON.parse(text);
-  } catch {
-    throw new Error(`${name} is no JSON.`);
-  }
-}
-
 /** @param {Project} project */
 function told({ video, objects }) {
   const rows = objects.reduce((sum, object) => sum + object.rows.length, 0);
@@ -308,10 +263,6 @@ function told({ video, objects }) {
 /** The sample that a source is.
  * @param {Source} source */
 const clipOf = ({ name, files }) => CLIPS.find((clip) => clip === name && !files);
-
-/** The last state of each object.
- * @param {Run} run */
-const statesOf = (run) => Object.fromEntries(run.objects.map(({ number, saves }) => [number, saves[saves.length - 1]]));
 
 /** The files of a source, where they are small enough to be copied.
  * @param {Source} source */

@@ -2,8 +2,10 @@
 // browser keeps of a page.
 
 import { FollowedObject } from "./objects.js";
+import { openFiles } from "./sources.js";
 
 /**
+ * @typedef {import("./keeping.js").Keeping} Keeping
  * @typedef {import("./run.js").Run} Run
  * @typedef {import("./objects.js").Row} Row
  *
@@ -38,6 +40,11 @@ export function projectOf(run) {
   return { bagtrack_project: 1, video, ended: run.isResting && !run.wake, skipped: run.skipped, objects };
 }
 
+/** The last state of each object.
+ * @param {Run} run */
+export const statesOf = (run) =>
+  Object.fromEntries(run.objects.map(({ number, saves }) => [number, saves[saves.length - 1]]));
+
 /** @param {Row} row
  * @returns {StoredRow} */
 function stored({ frame, time, box: { x, y, width, height }, score, status, corrected }) {
@@ -53,7 +60,7 @@ function rowOf([frame, time, x, y, width, height, score, status, isKey]) {
 /** Reads a project, and fails where it is none.
  * @param {unknown} document
  * @returns {Project} */
-export function readProject(document) {
+function readProject(document) {
   const project = /** @type {Project} */ (document);
   if (project?.bagtrack_project !== 1) throw new Error(`${NOT_ONE}it has no "bagtrack_project": 1.`);
   const { video, objects } = project;
@@ -112,7 +119,7 @@ export function withoutVideo({ video, objects }) {
 
 /** The project among files: others end with .json, too.
  * @param {File[]} files */
-export async function projectIn(files) {
+async function projectIn(files) {
   const named = files.filter(({ name }) => name.endsWith(".json"));
   if (files.length === 1) return named[0];
   const heads = await Promise.all(named.map((file) => file.slice(0, HEAD).text()));
@@ -122,7 +129,7 @@ export async function projectIn(files) {
 /** In what a source differs from the video of a project; nothing where it may be that.
  * @param {import("./source.js").Source} source
  * @param {Project} project */
-export function unlike({ name, size, count = Infinity }, { video, objects }) {
+function unlike({ name, size, count = Infinity }, { video, objects }) {
   const pixels = `${name} has ${size.width} × ${size.height} pixels`;
   // More rows than a call takes arguments.
   const last = objects.flatMap(({ rows }) => rows).reduce((last, [frame]) => Math.max(last, frame), 0);
@@ -136,10 +143,65 @@ export function unlike({ name, size, count = Infinity }, { video, objects }) {
 /** @param {import("./source.js").Source} source
  * @param {Project} project
  * @returns {import("./source.js").Source} */
-export function fitting(source, project) {
+function fitting(source, project) {
   const fault = unlike(source, project);
   if (!fault) return source;
   source.stop();
   source.close?.();
   throw new Error(fault);
+}
+
+/** Takes a project file, alone or with its video, and the video of a project that was opened without.
+ * @param {Keeping} keeping
+ * @param {File[]} files
+ * @returns {Promise<boolean>} Whether it did. */
+export async function take(keeping, files) {
+  const file = await projectIn(files);
+  const { run } = keeping.page;
+  if (file) await openProject(keeping, file, files.filter((other) => other !== file));
+  else if (run?.source.isAbsent && !run.source.isLive) await takeVideo(keeping, run, files);
+  else return false;
+  return true;
+}
+
+/** Takes the video of a project that was opened without; opens another one for itself.
+ * @param {Keeping} keeping
+ * @param {Run} run
+ * @param {File[]} files */
+async function takeVideo(keeping, run, files) {
+  const project = projectOf(run);
+  const states = statesOf(run);
+  const { id } = keeping;
+  const open = async () => {
+    const source = await openFiles(files);
+    return source.name === project.video.name ? fitting(source, project) : source;
+  };
+  const resume = async (/** @type {Run} */ opened) =>
+    !unlike(opened.source, project) && keeping.resume(opened, project, states, id);
+  await keeping.page.choose(open, resume);
+}
+
+/**
+ * @param {Keeping} keeping
+ * @param {File} file
+ * @param {File[]} files Of its video. */
+async function openProject(keeping, file, files) {
+  /** @type {Project} */
+  let project;
+  // Reads it as a source is opened: a choice that overtakes it says what is said.
+  const open = async () => {
+    project = readProject(parsed(await file.text(), file.name));
+    return files.length > 0 ? fitting(await openFiles(files), project) : withoutVideo(project);
+  };
+  await keeping.page.choose(open, (run) => keeping.resume(run, project, {}));
+}
+
+/** @param {string} text
+ * @param {string} name */
+function parsed(text, name) {
+  try {
+    return JSON.parse(text);
+  } catch {
+    throw new Error(`${name} is no JSON.`);
+  }
 }
