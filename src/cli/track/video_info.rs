@@ -92,36 +92,46 @@ impl VideoInfo {
     }
 
     fn told(path: &Path) -> io::Result<Self> {
-        let told = ask(path, "packet=pts_time,flags")?;
+        let told = ask(path, "packet=pts,flags")?;
         let (info, packets) = Self::parse(&told);
         // Some packets of VP8 are of pictures that are not shown, and nothing tells which.
         let is_vp8 = told.lines().any(|line| line.starts_with("stream,vp8,"));
         match are_frames(&packets) && !is_vp8 {
             true => Ok(info),
             // They have to be decoded.
-            false => Ok(Self::parse(&ask(path, "frame=pts_time")?).0),
+            false => Ok(Self::parse(&ask(path, "frame=pts")?).0),
         }
     }
 
-    /// Reads lines like `packet,0.040000,K__` or `frame,0.040000`, `stream,h264,25/1` and `format,"mov,mp4",0.000000`. Gives the
-    /// times in the order of the lines, too.
+    /// Reads lines like `packet,512,K__` or `frame,512`, `stream,h264,25/1,1/12800` and `format,"mov,mp4",0.000000`. Gives the
+    /// times in the order of the lines, too: from whole ticks, since ffprobe cuts seconds to microseconds.
     fn parse(told: &str) -> (Self, Vec<Option<f64>>) {
         let fields = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
-        let mut told_times = Vec::new();
-        let mut rate = None;
+        let mut ticks = Vec::new();
+        let (mut rate, mut tick) = (None, None);
         let mut indexed_from = None;
         for line in told.lines().map(fields) {
             match line.iter().map(String::as_str).collect::<Vec<_>>()[..] {
                 // A packet that an edit list leaves out is decoded, but not shown.
                 ["packet", _, flags, ..] if flags.contains('D') => {}
-                ["packet" | "frame", time, ..] => told_times.push(time.parse::<f64>().ok()),
-                ["stream", _, fraction, ..] => rate = Rate::parse(fraction),
+                ["packet" | "frame", count, ..] => ticks.push(count.parse::<f64>().ok()),
+                ["stream", _, fraction, base, ..] => {
+                    rate = Rate::parse(fraction);
+                    tick = base.split_once('/').and_then(|(over, under)| {
+                        Some((over.parse::<f64>().ok()?, under.parse::<f64>().ok()?))
+                    });
+                }
                 ["format", name, .., start] if INDEXED.contains(&name.trim_matches('"')) => {
                     indexed_from = start.parse().ok();
                 }
                 _ => {}
             }
         }
+        let seconds = |count: &Option<f64>| {
+            let (over, under) = tick?;
+            Some((*count)? * over / under)
+        };
+        let told_times: Vec<_> = ticks.iter().map(seconds).collect();
         let all: Option<Vec<f64>> = told_times.iter().copied().collect();
         let mut times = all.unwrap_or_default();
         times.sort_by(f64::total_cmp);
@@ -181,7 +191,8 @@ impl VideoInfo {
 fn ask(path: &Path, each: &str) -> io::Result<String> {
     let mut command = Command::new(FFPROBE);
     command.args(["-v", "error", "-select_streams", "v:0", "-of", "csv"]);
-    let entries = format!("format=format_name,start_time:stream=codec_name,avg_frame_rate:{each}");
+    let entries =
+        format!("format=format_name,start_time:stream=codec_name,avg_frame_rate,time_base:{each}");
     command.args(["-show_entries", &entries]).arg(path);
     Ok(String::from_utf8_lossy(&command.output()?.stdout).into_owned())
 }
@@ -205,7 +216,7 @@ mod tests {
     fn times_are_in_the_order_of_showing_and_count_from_the_first() {
         // B-frames come before the frames that they are shown after; the first packet is cut off by an edit list.
         let told =
-            "packet,0.9,KD_\npacket,1.0,K__\npacket,1.2,___\npacket,1.1,___\nstream,h264,10/1\n";
+            "packet,9,KD_\npacket,10,K__\npacket,12,___\npacket,11,___\nstream,h264,10/1,1/10\n";
         let (info, packets) = VideoInfo::parse(told);
         assert!(are_frames(&packets));
         assert_eq!(info.count(), Some(3));
@@ -217,10 +228,17 @@ mod tests {
         assert_eq!((at(0.0), at(0.1), at(0.11), at(0.3)), (0, 1, 2, 3));
     }
 
+    /// Thirtieths of a second, of which ffprobe tells 0.066667 and 2.133333.
+    #[test]
+    fn times_after_a_first_one_that_is_not_0_are_rounded_once() {
+        let (info, _) = VideoInfo::parse("packet,2,K__\npacket,64,___\nstream,h264,30/1,1/30\n");
+        assert_eq!(info.time(1), 2.066667);
+    }
+
     #[test]
     fn a_frame_of_an_indexed_file_is_found_by_a_time_between_it_and_the_one_before() {
         let packets =
-            "packet,1.0,K__\npacket,1.1,___\npacket,1.4,___\npacket,1.4,___\nstream,h264,10/1\n";
+            "packet,10,K__\npacket,11,___\npacket,14,___\npacket,14,___\nstream,h264,10/1,1/10\n";
         let seek_to = |format: &str| {
             let (info, _) = VideoInfo::parse(&format!("{packets}{format}\n"));
             let round = |time: f64| (time * 1e6).round() / 1e6;
@@ -240,7 +258,7 @@ mod tests {
     #[test]
     fn without_times_the_rate_tells() {
         let (info, packets) =
-            VideoInfo::parse("packet,N/A,K__\npacket,0.04,___\nstream,h264,30000/1001\n");
+            VideoInfo::parse("packet,N/A,K__\npacket,4,___\nstream,h264,30000/1001,1/100\n");
         assert!(!are_frames(&packets));
         assert_eq!((info.count(), info.time(30)), (None, 1.001));
         assert_eq!((info.frame_at(1.001), info.frame_at(1.0)), (30, 30));
