@@ -82,7 +82,8 @@ pub struct Args {
     /// Also writes every frame with its boxes: green tracking, orange uncertain, red lost. OUT is a new video (.mp4,
     /// .m4v, .mov, .mkv, .webm, .avi, .gif), for which ffmpeg must be installed; or a new folder of JPEG files, if it
     /// has no ending, or a slash at its end. The frames of a video keep their times; in an .avi they last equally long, at
-    /// the rate that the source has on average, and a .gif has at most 50 of them a second.
+    /// the rate that the source has on average, and a .gif has at most 50 of them a second. An odd side gets a black row
+    /// or column more: encoders want even ones.
     #[arg(long, value_name = "OUT")]
     draw: Option<PathBuf>,
 }
