@@ -16,8 +16,8 @@ use reqwest::{Method, RequestBuilder, Response, StatusCode};
 use std::convert::Infallible;
 use std::net::IpAddr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
+use tokio::sync::Notify;
 
 const GREEDY: &str = "198.51.100.1";
 const MODEST: &str = "203.0.113.1";
@@ -533,21 +533,19 @@ async fn several_frames_of_a_request_wait_where_single_ones_are_refused() {
     for _ in 0..24 {
         ids.push(open(&app, GREEDY).await);
     }
-    let refused = &AtomicUsize::new(0);
+    let refused = &Notify::new();
     let single = async |id: String| -> Infallible {
         loop {
             let path = format!("/sessions/{id}/frames");
             let request = request_as(&app, GREEDY, &path, &[]).body(pictures::png(1));
             if request.send().await.unwrap().status() == StatusCode::SERVICE_UNAVAILABLE {
-                refused.fetch_add(1, Ordering::Relaxed);
+                refused.notify_one();
             }
         }
     };
     let id = ids.pop().expect("it is one of those that are open");
     let several = async {
-        while refused.load(Ordering::Relaxed) == 0 {
-            tokio::task::yield_now().await;
-        }
+        refused.notified().await;
         let mut form = Form::new();
         for _ in 0..FRAMES {
             form = form.part("frame", Part::bytes(pictures::png(1)));
