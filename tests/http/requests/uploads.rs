@@ -104,15 +104,20 @@ async fn a_large_body_that_comes_steadily_has_more_time_than_a_small_one() {
     expect(answer.unwrap(), StatusCode::OK).await;
 }
 
-#[tokio::test]
-async fn a_body_slower_than_the_least_rate_is_408_in_every_form() {
+/// A service whose bodies have to come fast, but may take long in all: that ends with the same answer, so it must not be
+/// what ends these.
+async fn with_a_high_least_rate() -> TestApplication {
     let app = TestApplication::start_with(|config| {
-        // The time for a whole body ends with the same answer, so it must not be what ends these.
         config.body_timeout = Duration::from_secs(600);
         config.limits.body_grace = Duration::from_millis(50);
         config.limits.min_body_rate = 1_000_000;
     });
-    let app = app.await;
+    app.await
+}
+
+#[tokio::test]
+async fn a_body_slower_than_the_least_rate_is_408_in_every_form() {
+    let app = with_a_high_least_rate().await;
     let id = app.open().await;
     let timeouts = expect_body_timeouts(&app, &id);
     tokio::time::timeout(Duration::from_secs(30), timeouts)
@@ -124,12 +129,7 @@ async fn a_body_slower_than_the_least_rate_is_408_in_every_form() {
 /// The rest of it was waited for until the deadline of the largest body.
 #[tokio::test]
 async fn the_rest_of_a_refused_body_has_the_same_least_rate() {
-    let app = TestApplication::start_with(|config| {
-        config.body_timeout = Duration::from_secs(600);
-        config.limits.body_grace = Duration::from_millis(50);
-        config.limits.min_body_rate = 1_000_000;
-    });
-    let app = app.await;
+    let app = with_a_high_least_rate().await;
     let mut connection = RawConnection::open(app.address).await;
     let head = "POST /sessions/none/frames HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9000000\r\n\r\nbegun";
     connection.send(head).await;
