@@ -10,6 +10,7 @@ use bagtrack_testing::within::within;
 use futures_util::future::join_all;
 use reqwest::{Method, StatusCode};
 use serde_json::Value;
+use std::time::Duration;
 
 #[tokio::test]
 async fn lines_and_messages_count_as_sent() {
@@ -45,6 +46,9 @@ async fn an_address_has_a_share_of_the_connections_and_what_ends_before_a_handle
     let app = TestApplication::start_with(|config| {
         config.max_connections = 4;
         config.limits.client_connections = Some(2);
+        // A busy connection stays busy until the end, however slow the machine is.
+        config.body_timeout = Duration::from_secs(600);
+        config.limits.body_grace = Duration::from_secs(600);
     });
     let app = app.await;
     let mut busy = Vec::new();
