@@ -12,7 +12,7 @@ use std::net::Ipv4Addr;
 use std::sync::Arc;
 use uuid::Uuid;
 
-/// Who makes a request, as the layer [`authenticate`](crate::http::middleware::authenticate::authenticate) has found.
+/// Who makes a request, as [`authenticate`](crate::http::middleware::authenticate::authenticate) has found.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Caller {
     credential: Credential,

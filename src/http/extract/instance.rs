@@ -8,11 +8,11 @@ use crate::http::state::AppState;
 use axum::extract::{FromRequestParts, Request};
 use axum::http::header::HeaderName;
 use axum::http::request::Parts;
-use axum::http::{Extensions, Uri};
+use axum::http::{Extensions, HeaderMap, HeaderValue, Uri};
 use bagtrack_api::ProblemDocument;
 use bagtrack_api::ProblemKind as Kind;
+use bagtrack_sessions::random::new_id;
 use std::convert::Infallible;
-use tower_http::request_id::RequestId;
 
 pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 const MAX_ID_BYTES: usize = 64;
@@ -31,13 +31,13 @@ pub struct Instance {
 
 impl Instance {
     pub fn of(request: &Request) -> Self {
-        Self::from_head(request.extensions(), request.uri())
+        Self::from_head(request.extensions(), request.uri(), request.headers())
     }
 
-    fn from_head(extensions: &Extensions, uri: &Uri) -> Self {
+    fn from_head(extensions: &Extensions, uri: &Uri, headers: &HeaderMap) -> Self {
         let known = extensions.get::<ClientPath>();
-        let id = extensions.get::<RequestId>();
-        let id = id.and_then(|id| id.header_value().to_str().ok());
+        let id = headers.get(REQUEST_ID);
+        let id = id.and_then(|id| id.to_str().ok());
         Self {
             path: known.map_or_else(|| uri.path().to_owned(), |path| path.0.clone()),
             request_id: id.unwrap_or_default().to_owned(),
@@ -67,22 +67,26 @@ impl<S: Sync> FromRequestParts<S> for Instance {
     type Rejection = Infallible;
 
     async fn from_request_parts(parts: &mut Parts, _state: &S) -> Result<Self, Infallible> {
-        Ok(Self::from_head(&parts.extensions, &parts.uri))
+        Ok(Self::from_head(
+            &parts.extensions,
+            &parts.uri,
+            &parts.headers,
+        ))
     }
 }
 
-/// Middleware that removes an id that is too long or has other characters than ids need: ids are logged and sent back.
-pub async fn remove_unusable_id(mut request: Request) -> Request {
-    let is_usable = |id: &[u8]| {
+/// Gives a request an id, in its header, where it has none or one that is too long or has other characters than ids
+/// need: ids are logged and sent back. Returns the id.
+pub fn set_request_id(headers: &mut HeaderMap) -> HeaderValue {
+    let is_usable = |id: &&HeaderValue| {
         let is_allowed = |byte: &u8| byte.is_ascii_alphanumeric() || b"-_.:".contains(byte);
-        (1..=MAX_ID_BYTES).contains(&id.len()) && id.iter().all(is_allowed)
+        (1..=MAX_ID_BYTES).contains(&id.len()) && id.as_bytes().iter().all(is_allowed)
     };
-    let headers = request.headers_mut();
-    if headers
-        .get(REQUEST_ID)
-        .is_some_and(|id| !is_usable(id.as_bytes()))
-    {
-        headers.remove(REQUEST_ID);
+    if let Some(id) = headers.get(REQUEST_ID).filter(is_usable) {
+        return id.clone();
     }
-    request
+    let id = new_id().to_string();
+    let id = HeaderValue::try_from(id).expect("a UUID is visible ASCII");
+    headers.insert(REQUEST_ID, id.clone());
+    id
 }

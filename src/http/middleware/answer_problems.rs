@@ -5,25 +5,24 @@ use crate::http::problems::problem::Problem;
 use crate::http::respond::json::Json;
 use crate::http::state::AppState;
 use axum::body::Body;
-use axum::extract::{Request, State};
+use axum::extract::Request;
 use axum::http::HeaderValue;
 use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE, RETRY_AFTER};
-use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use bagtrack_api::media_types::PROBLEM;
 use std::any::Any;
 
 pub async fn answer_problems(
-    State(state): State<AppState>,
-    instance: Instance,
+    state: &AppState,
     request: Request,
-    next: Next,
+    next: impl AsyncFnOnce(Request) -> Response,
 ) -> Response {
-    let mut response = next.run(request).await;
+    let instance = Instance::of(&request);
+    let mut response = next(request).await;
     let Some(problem) = response.extensions_mut().remove::<Problem>() else {
         return response;
     };
-    let document = Json(instance.report(&state, &problem)).into_response();
+    let document = Json(instance.report(state, &problem)).into_response();
     *response.body_mut() = document.into_body();
     // The response's own headers stay: it may have some that the problem does not know, like `Allow`.
     let headers = response.headers_mut();

@@ -6,10 +6,9 @@
 use crate::http::extract::caller::Caller;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
-use axum::extract::{Request, State};
+use axum::extract::Request;
 use axum::http::header::{AUTHORIZATION, SEC_WEBSOCKET_PROTOCOL, WWW_AUTHENTICATE};
 use axum::http::{HeaderMap, HeaderValue};
-use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use bagtrack_access::{Credential, NotIdentified, TOKEN_PREFIX};
 use bagtrack_api::ProblemKind as Kind;
@@ -21,13 +20,12 @@ const CHALLENGE: HeaderValue = HeaderValue::from_static("Bearer realm=\"bagtrack
 const INVALID_TOKEN: HeaderValue =
     HeaderValue::from_static("Bearer realm=\"bagtrack\", error=\"invalid_token\"");
 
-/// The middleware: puts the [`Caller`] into the extensions of the request, or answers 401.
-pub async fn authenticate(
-    State(state): State<AppState>,
-    mut request: Request,
-    next: Next,
-) -> Response {
-    match caller(&state, request.headers()).await {
+/// Puts the [`Caller`] into the extensions of the request.
+///
+/// # Errors
+/// The answer 401.
+pub async fn authenticate(state: &AppState, request: &mut Request) -> Result<(), Response> {
+    match caller(state, request.headers()).await {
         Ok(caller) => {
             // Who has a key shares its quotas, wherever the requests come from. A page is not to use them up.
             if let Some(name) = caller.owner().name() {
@@ -38,30 +36,29 @@ pub async fn authenticate(
                 request.extensions_mut().insert(client);
             }
             request.extensions_mut().insert(caller);
-            next.run(request).await
+            Ok(())
         }
-        Err(refused) => unauthorized(&refused, request.headers()),
+        Err(refused) => Err(unauthorized(&refused, request.headers())),
     }
 }
 
-/// The middleware of `/metrics`: asks for the key of the metrics, where there is one, and else does as [`authenticate`].
-pub async fn authenticate_metrics(
-    state: State<AppState>,
-    mut request: Request,
-    next: Next,
-) -> Response {
+/// Asks for the key of the metrics, where there is one, and else does as [`authenticate`].
+///
+/// # Errors
+/// The answer 401.
+pub async fn authenticate_metrics(state: &AppState, request: &mut Request) -> Result<(), Response> {
     let Some(key) = &state.config.access.metrics_key else {
-        return authenticate(state, request, next).await;
+        return authenticate(state, request).await;
     };
     // Digests are compared in constant time.
     let digest = |text: &str| blake3::hash(text.as_bytes());
     let presented = bearer(request.headers()).map(digest);
     if presented != Some(digest(key.text())) {
-        return unauthorized(&NotIdentified::Key, request.headers());
+        return Err(unauthorized(&NotIdentified::Key, request.headers()));
     }
     let reader = Caller::with_key(Credential::default());
     request.extensions_mut().insert(reader);
-    next.run(request).await
+    Ok(())
 }
 
 fn unauthorized(refused: &NotIdentified, headers: &HeaderMap) -> Response {

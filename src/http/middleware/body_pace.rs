@@ -4,22 +4,18 @@
 //! until the deadline of the body. That comes later the more has arrived, so that a video may take its time.
 
 use crate::http::extract::body::TooSlow;
-use crate::http::state::AppState;
 use axum::body::{Body, Bytes, HttpBody};
-use axum::extract::{Request, State};
-use axum::middleware::Next;
-use axum::response::Response;
+use axum::extract::Request;
 use bagtrack_config::{BODY_BYTES_PER_SECOND, Config};
 use bagtrack_net::LeastRate;
 use std::pin::Pin;
 use std::task::{Context, Poll};
 
-pub async fn pace_body(State(state): State<AppState>, request: Request, next: Next) -> Response {
-    let paced = |body: Body| match body.is_end_stream() {
+pub fn pace_body(config: &Config, request: Request) -> Request {
+    request.map(|body| match body.is_end_stream() {
         true => body,
-        false => Body::new(Paced::new(body, &state.config)),
-    };
-    next.run(request.map(paced)).await
+        false => Body::new(Paced::new(body, config)),
+    })
 }
 
 struct Paced {

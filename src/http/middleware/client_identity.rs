@@ -3,8 +3,7 @@
 use crate::http::problems::problem::Problem;
 use crate::http::respond::rate_limit::write_headers;
 use crate::http::state::AppState;
-use axum::extract::{Request, State};
-use axum::middleware::Next;
+use axum::extract::Request;
 use axum::response::Response;
 use bagtrack_api::ProblemKind as Kind;
 use bagtrack_net::Peer;
@@ -46,7 +45,11 @@ pub(super) fn client_at(request: &Request) -> Option<Client> {
 }
 
 /// The middleware. A request that has its client already keeps it.
-pub async fn identify(State(state): State<AppState>, mut request: Request, next: Next) -> Response {
+pub async fn identify(
+    state: &AppState,
+    mut request: Request,
+    next: impl AsyncFnOnce(Request) -> Response,
+) -> Response {
     match request.extensions().get::<Client>() {
         Some(client) => {
             if let Some(name) = client.key() {
@@ -60,7 +63,7 @@ pub async fn identify(State(state): State<AppState>, mut request: Request, next:
         }
     }
     let client = request.extensions().get::<Client>().cloned();
-    let mut response = next.run(request).await;
+    let mut response = next(request).await;
     let problem = response.extensions().get::<Problem>();
     if problem.is_some_and(|problem| problem.kind() == Kind::QuotaExceeded) {
         // Whoever does not wait before it asks again costs the network threads time.

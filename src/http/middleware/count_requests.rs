@@ -2,18 +2,17 @@
 
 use crate::http::state::AppState;
 use axum::body::{Body, HttpBody};
-use axum::extract::{MatchedPath, Request, State};
+use axum::extract::{MatchedPath, Request};
 use axum::http::Method;
-use axum::middleware::Next;
 use axum::response::Response;
 use bagtrack_sessions::clock;
 use http_body_util::BodyExt;
 
 /// The middleware. It has to see the matched route.
 pub async fn count_request(
-    State(state): State<AppState>,
+    state: &AppState,
     request: Request,
-    next: Next,
+    next: impl AsyncFnOnce(Request) -> Response,
 ) -> Response {
     let started = clock::now();
     let method = method_label(request.method());
@@ -26,7 +25,7 @@ pub async fn count_request(
             received.increment(bytes as u64);
         })),
     });
-    let response = next.run(request).await;
+    let response = next(request).await;
     let sent = state.metrics.sent_bytes.clone();
     let response = match response.body().size_hint().exact() {
         Some(bytes) => {

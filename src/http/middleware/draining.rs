@@ -2,22 +2,14 @@
 //! elsewhere in time.
 
 use crate::http::state::AppState;
-use axum::extract::{Request, State};
 use axum::http::{HeaderName, HeaderValue};
-use axum::middleware::Next;
 use axum::response::Response;
 
 pub const DRAINING: HeaderName = HeaderName::from_static(bagtrack_api::headers::DRAINING);
 
-pub async fn mark_draining(
-    State(state): State<AppState>,
-    request: Request,
-    next: Next,
-) -> Response {
-    let mut response = next.run(request).await;
+pub fn mark_draining(state: &AppState, response: &mut Response) {
     if state.is_draining() {
         let marked = HeaderValue::from_static("true");
         response.headers_mut().insert(DRAINING, marked);
     }
-    response
 }

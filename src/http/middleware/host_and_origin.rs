@@ -6,32 +6,28 @@
 
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
-use axum::extract::{Request, State};
+use axum::extract::Request;
 use axum::http::header::{HOST, ORIGIN};
 use axum::http::{HeaderMap, Version};
-use axum::middleware::Next;
-use axum::response::{IntoResponse, Response};
 use bagtrack_access::AllowedHosts;
 use bagtrack_config::Config;
 
 /// Refuses requests that do not name one host (RFC 9112, section 3.2): caches and proxies before the service might take
 /// another one of several.
-pub async fn one_host(request: Request, next: Next) -> Response {
+pub fn one_host(request: &Request) -> Result<(), Problem> {
     let count = request.headers().get_all(HOST).iter().count();
     let may_lack = request.version() < Version::HTTP_11;
     if count == 1 || (count == 0 && may_lack) {
-        return next.run(request).await;
+        return Ok(());
     }
     let detail = format!("A request has one `Host` header, and this one has {count}.");
-    Problem::malformed(detail).into_response()
+    Err(Problem::malformed(detail))
 }
 
-pub async fn check_origin(State(state): State<AppState>, request: Request, next: Next) -> Response {
+/// Refuses what a browser sends for a page of another origin, or under the name of another host.
+pub fn check_origin(state: &AppState, request: &Request) -> Result<(), Problem> {
     let hosts = AllowedHosts::of(&state.config, state.access.is_needed());
-    match check(&state.config, hosts, &request) {
-        Ok(()) => next.run(request).await,
-        Err(problem) => problem.into_response(),
-    }
+    check(&state.config, hosts, request)
 }
 
 fn check(config: &Config, hosts: AllowedHosts, request: &Request) -> Result<(), Problem> {

@@ -7,9 +7,8 @@
 
 use crate::http::state::AppState;
 use axum::body::{Body, Bytes, HttpBody};
-use axum::extract::{Request, State};
+use axum::extract::Request;
 use axum::http::header::EXPECT;
-use axum::middleware::Next;
 use axum::response::Response;
 use http_body_util::{BodyExt, Limited};
 use std::pin::Pin;
@@ -17,9 +16,9 @@ use std::task::{Context, Poll};
 use tokio::sync::oneshot;
 
 pub async fn drain_refused(
-    State(state): State<AppState>,
+    state: &AppState,
     request: Request,
-    next: Next,
+    next: impl AsyncFnOnce(Request) -> Response,
 ) -> Response {
     let expects = request.headers().contains_key(EXPECT);
     let (give_back, returned) = oneshot::channel();
@@ -30,7 +29,7 @@ pub async fn drain_refused(
             give_back: Some(give_back),
         })
     });
-    let response = next.run(request).await;
+    let response = next(request).await;
     let status = response.status();
     if (status.is_client_error() || status.is_server_error())
         && let Ok((body, polled)) = returned.await

@@ -1,6 +1,6 @@
-//! The layers that requests pass through before their handlers. [`router`](super::server::router) gives their order.
+//! What requests pass through before their handlers. [`chain`] gives the order.
 //!
-//! In: a request. Out: the request, with what the layer found in its extensions, or a response in its place.
+//! In: a request. Out: the request, with what was found in its extensions, or a response in its place.
 //!
 //! What can go wrong: a client says that it is another (`X-Forwarded-For` counts only from a trusted proxy), or reads no
 //! answer because it is still sending its body ([`lingering_close`]).
@@ -9,6 +9,7 @@ pub mod answer_problems;
 pub mod authenticate;
 pub mod base_path;
 pub mod body_pace;
+pub mod chain;
 pub mod client_identity;
 pub mod cors;
 pub mod count_requests;

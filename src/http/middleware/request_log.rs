@@ -9,8 +9,7 @@ use super::count_requests::method_label;
 use super::trace_context::{TRACEPARENT, TraceContext};
 use crate::http::extract::instance::Instance;
 use crate::http::state::AppState;
-use axum::extract::{Request, State};
-use axum::middleware::Next;
+use axum::extract::Request;
 use axum::response::Response;
 use bagtrack_sessions::clock;
 use bagtrack_sessions::short_id;
@@ -26,13 +25,13 @@ const SHOWN_OF_ID: usize = 8;
 const PROBES: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
 
 pub async fn log_request(
-    State(state): State<AppState>,
+    state: &AppState,
     mut request: Request,
-    next: Next,
+    next: impl AsyncFnOnce(Request) -> Response,
 ) -> Response {
     let started = clock::now();
     let is_probe = PROBES.contains(&request.uri().path());
-    let address = note_address(&state, &mut request);
+    let address = note_address(state, &mut request);
     let (span, context) = (
         span(&request, is_probe, address),
         TraceContext::of(request.headers()),
@@ -40,7 +39,7 @@ pub async fn log_request(
     #[cfg(feature = "otel")]
     let context = super::exported_span::join(&span, &request, context);
     span.record("trace", context.trace_id());
-    let mut response = next.run(request).instrument(span.clone()).await;
+    let mut response = next(request).instrument(span.clone()).await;
     response.headers_mut().insert(TRACEPARENT, context.header());
     let (status, ms) = (
         response.status().as_u16(),

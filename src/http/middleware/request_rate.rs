@@ -7,9 +7,8 @@ use super::client_identity::{REFUSAL_DELAY, client_at};
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::REPLAYED;
 use crate::http::state::AppState;
-use axum::extract::{MatchedPath, Request, State};
+use axum::extract::{MatchedPath, Request};
 use axum::http::Method;
-use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use bagtrack_sessions::clock::sleep;
 
@@ -41,9 +40,13 @@ impl Counts {
 }
 
 /// The middleware. It has to see the matched route, and the address that was noted.
-pub async fn bound_rate(State(state): State<AppState>, request: Request, next: Next) -> Response {
+pub async fn bound_rate(
+    state: &AppState,
+    request: Request,
+    next: impl AsyncFnOnce(Request) -> Response,
+) -> Response {
     let Some(client) = client_at(&request) else {
-        return next.run(request).await;
+        return next(request).await;
     };
     let count = || state.clients.account(&client).count_asked();
     let counts = Counts::of(&request);
@@ -54,7 +57,7 @@ pub async fn bound_rate(State(state): State<AppState>, request: Request, next: N
         sleep(REFUSAL_DELAY).await;
         return Problem::from(exceeded).into_response();
     }
-    let response = next.run(request).await;
+    let response = next(request).await;
     let counts_now = match counts {
         Counts::Always => false,
         Counts::AsProbe => true,

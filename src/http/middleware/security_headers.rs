@@ -1,11 +1,10 @@
 //! Headers that tell browsers what the answers may do.
 
-use axum::extract::Request;
 use axum::http::header::{
-    CONTENT_SECURITY_POLICY, REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS,
+    X_FRAME_OPTIONS,
 };
 use axum::http::{HeaderName, HeaderValue};
-use axum::middleware::Next;
 use axum::response::Response;
 
 /// What a policy has to begin with that a page sets for itself. Nothing may be loaded, and no page may frame it.
@@ -38,14 +37,14 @@ pub const HEADERS: [(HeaderName, &str); 5] = [
     ),
 ];
 
-/// The middleware: sets them on every answer. A page may have a policy of its own.
-pub async fn secure(request: Request, next: Next) -> Response {
-    let mut response = next.run(request).await;
+/// Sets them on an answer, which is kept by no cache unless it says so itself. A page may have a policy of its own.
+pub fn secure(response: &mut Response) {
     let headers = response.headers_mut();
     for (name, value) in HEADERS {
         headers.insert(name, HeaderValue::from_static(value));
     }
     let strict = HeaderValue::from_static(STRICT);
     headers.entry(CONTENT_SECURITY_POLICY).or_insert(strict);
-    response
+    let no_store = HeaderValue::from_static("no-store");
+    headers.entry(CACHE_CONTROL).or_insert(no_store);
 }

@@ -4,8 +4,8 @@
 use crate::http::server::router::https_only;
 use crate::http::server::router::probes_only;
 use crate::http::state::AppState;
+use axum::Router;
 use axum::body::Body;
-use axum::{Extension, Router};
 use bagtrack_config::MAX_BUFFER_BYTES;
 use bagtrack_net::{
     Begun, ClientLimits, ConnectionHold, ConnectionIo, Peer, Security, Transport, is_trusted,
@@ -132,11 +132,13 @@ impl ConnectionService {
             half_close_timeout: limits.half_close_timeout,
         };
         let io = ConnectionIo::new(transport, activity.clone(), limits);
-        let service = routes.layer(Extension(Peer(peer)));
-        let service = TowerToHyperService::new(service.layer(Extension(hold.clone())));
+        let service = TowerToHyperService::new(routes);
+        let connection = hold.clone();
         let watched = service_fn(move |request: Request<Incoming>| {
             let activity = activity.clone();
-            let request = request.map(|body| activity.receive(Body::new(body)));
+            let mut request = request.map(|body| activity.receive(Body::new(body)));
+            request.extensions_mut().insert(Peer(peer));
+            request.extensions_mut().insert(connection.clone());
             let answer = service.call(request);
             async move {
                 // hyper goes on with the next of the requests that came at once, up to 16 of them.

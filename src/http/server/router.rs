@@ -1,19 +1,12 @@
 //! All routes, and the layers that every request passes through.
 
-use crate::http::extract::instance::{Instance, REQUEST_ID, remove_unusable_id};
-use crate::http::middleware::answer_problems::{answer_problems, panic_response};
-use crate::http::middleware::authenticate::{authenticate, authenticate_metrics};
+use crate::http::extract::instance::Instance;
+use crate::http::middleware::answer_problems::panic_response;
 use crate::http::middleware::base_path::mount;
-use crate::http::middleware::body_pace::pace_body;
-use crate::http::middleware::client_identity::identify;
+use crate::http::middleware::chain::{
+    every_request, metrics_request, page_request, session_request,
+};
 use crate::http::middleware::cors::cors;
-use crate::http::middleware::count_requests::count_request;
-use crate::http::middleware::draining::mark_draining;
-use crate::http::middleware::host_and_origin::{check_origin, one_host};
-use crate::http::middleware::lingering_close::drain_refused;
-use crate::http::middleware::request_log::log_request;
-use crate::http::middleware::request_rate::bound_rate;
-use crate::http::middleware::security_headers::secure;
 use crate::http::page::docs;
 use crate::http::page::sample_clips;
 use crate::http::page::static_files;
@@ -24,8 +17,8 @@ use axum::Router;
 use axum::extract::DefaultBodyLimit;
 #[cfg(feature = "tls")]
 use axum::extract::Request;
-use axum::http::header::{CACHE_CONTROL, CONNECTION};
-use axum::http::{HeaderMap, HeaderValue};
+use axum::http::HeaderMap;
+use axum::http::header::CONNECTION;
 #[cfg(feature = "tls")]
 use axum::http::{Method, header::HOST};
 use axum::middleware;
@@ -33,8 +26,6 @@ use axum::middleware;
 use axum::response::{IntoResponse, Redirect, Response};
 use axum::routing::get;
 use tower_http::catch_panic::CatchPanicLayer;
-use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
-use tower_http::set_header::SetResponseHeaderLayer;
 
 /// The whole service. `extra` routes are served beside its own. They pass through the layers of all requests, and not
 /// through those of [`routes`], which say who may use the service.
@@ -62,41 +53,22 @@ pub fn https_only(state: &AppState) -> Router {
     with_layers(Router::new().fallback(to_https), state)
 }
 
-/// The layers that every request passes through. Each call of `layer` puts every route in a box, which each request copies.
+/// The layers that every request passes through: the first is the first to see it.
 fn with_layers(routes: Router, state: &AppState) -> Router {
-    let config = &state.config;
-    let with_state = || state.clone();
-    // The first layer is the first to see a request.
-    let of_requests = (
-        middleware::map_request(remove_unusable_id),
-        SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid),
-        PropagateRequestIdLayer::new(REQUEST_ID),
-        middleware::from_fn_with_state(with_state(), count_request),
-        middleware::from_fn_with_state(with_state(), log_request),
-        middleware::from_fn_with_state(with_state(), mark_draining),
-        middleware::from_fn(secure),
-        SetResponseHeaderLayer::if_not_present(CACHE_CONTROL, HeaderValue::from_static("no-store")),
-        middleware::from_fn_with_state(with_state(), answer_problems),
-        middleware::from_fn_with_state(with_state(), bound_rate),
+    routes.layer((
+        middleware::from_fn_with_state(state.clone(), every_request),
         CatchPanicLayer::custom(panic_response),
-        middleware::from_fn(one_host),
-        cors(&config.cors_origins),
-    );
-    let of_bodies = (
-        middleware::from_fn_with_state(with_state(), pace_body),
-        middleware::from_fn_with_state(with_state(), drain_refused),
-        DefaultBodyLimit::max(config.max_body_bytes),
-    );
-    routes.layer(of_bodies).layer(of_requests)
+        cors(&state.config.cors_origins),
+        DefaultBodyLimit::max(state.config.max_body_bytes),
+    ))
 }
 
 /// The routes of the service, each behind the checks of who may use it. Probes come from the machine's own address and
 /// with no key.
 fn routes(state: &AppState) -> Router<AppState> {
-    let with_key = middleware::from_fn_with_state(state.clone(), authenticate);
-    let with_metrics_key = middleware::from_fn_with_state(state.clone(), authenticate_metrics);
-    let of_client = middleware::from_fn_with_state(state.clone(), identify);
-    let from_origin = middleware::from_fn_with_state(state.clone(), check_origin);
+    let of_page = middleware::from_fn_with_state(state.clone(), page_request);
+    let of_sessions = middleware::from_fn_with_state(state.clone(), session_request);
+    let of_metrics = middleware::from_fn_with_state(state.clone(), metrics_request);
     let document = docs::document(match state.config.base_path.as_str() {
         "" => routes::document(),
         path => routes::document_at(path),
@@ -121,9 +93,9 @@ fn routes(state: &AppState) -> Router<AppState> {
         .route("/docs", get(docs::redirect))
         .route("/docs/", get(docs::index))
         .route("/docs/{*path}", get(docs::asset))
-        .merge(sessions.route_layer((with_key, of_client)))
-        .route_layer(from_origin)
-        .merge(metrics.route_layer(with_metrics_key))
+        .route_layer(of_page)
+        .merge(sessions.route_layer(of_sessions))
+        .merge(metrics.route_layer(of_metrics))
         .merge(probes)
 }
 
