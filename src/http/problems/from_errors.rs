@@ -1,6 +1,6 @@
 //! The problems that the errors of the other modules are.
 
-use super::problem::Problem;
+use super::problem::{Effect, Problem};
 use bagtrack_api::ProblemKind as Kind;
 use bagtrack_ingest::IngestError;
 use bagtrack_quotas::RateExceeded;
@@ -117,8 +117,8 @@ impl From<SnapshotError> for Problem {
 
 impl From<QueueFull> for Problem {
     fn from(_: QueueFull) -> Self {
-        let detail = "Try again after the time in `Retry-After`. Nothing was changed.";
-        Self::new(Kind::QueueFull, detail)
+        let detail = "Try again after the time in `Retry-After`.";
+        Self::new(Kind::QueueFull, detail).with_effect(Effect::NothingChanged)
     }
 }
 
@@ -128,8 +128,8 @@ impl From<BudgetFull> for Problem {
             BudgetFull::All => QueueFull.into(),
             BudgetFull::Client => {
                 let detail = "The bodies of this client's requests take as much memory as one client's may. Try again \
-                    after the time in `Retry-After`. Nothing was changed.";
-                Self::new(Kind::QuotaExceeded, detail)
+                    after the time in `Retry-After`.";
+                Self::new(Kind::QuotaExceeded, detail).with_effect(Effect::NothingChanged)
             }
         }
     }
@@ -149,14 +149,14 @@ impl From<Stopped> for Problem {
             Stopped::Cost(limit) => {
                 let detail = format!(
                     "The frames of this request took more than {limit:?} of processor time. Send fewer or smaller \
-                     frames in a request. None of them was tracked."
+                     frames in a request."
                 );
-                Self::new(Kind::RequestTooCostly, detail)
+                Self::new(Kind::RequestTooCostly, detail).with_effect(Effect::NoFrameTracked)
             }
             Stopped::Overload => {
                 let detail = "More frames of this client come than are done, and they wait too long for a worker. Send \
-                    fewer at a time, or try again after the time in `Retry-After`. Nothing was changed.";
-                Self::new(Kind::QueueFull, detail)
+                    fewer at a time, or try again after the time in `Retry-After`.";
+                Self::new(Kind::QueueFull, detail).with_effect(Effect::NothingChanged)
             }
             // Nobody reads the answer to work that was abandoned.
             Stopped::Deadline | Stopped::Abandoned => Self::work_timeout(),
@@ -166,8 +166,8 @@ impl From<Stopped> for Problem {
 
 impl From<SessionBusy> for Problem {
     fn from(_: SessionBusy) -> Self {
-        let detail = "Wait for the answers to the frames already sent. The session is unchanged.";
-        Self::new(Kind::SessionBusy, detail)
+        let detail = "Wait for the answers to the frames already sent.";
+        Self::new(Kind::SessionBusy, detail).with_effect(Effect::SessionUnchanged)
     }
 }
 
@@ -198,9 +198,9 @@ impl From<WorkPanicked> for Problem {
 impl From<QuotaExhausted> for Problem {
     fn from(QuotaExhausted { what, limit }: QuotaExhausted) -> Self {
         let detail = format!(
-            "One client may have {limit} {what} here. Try again after the time in `Retry-After`. Nothing was changed."
+            "One client may have {limit} {what} here. Try again after the time in `Retry-After`."
         );
-        Self::new(Kind::QuotaExceeded, detail)
+        Self::new(Kind::QuotaExceeded, detail).with_effect(Effect::NothingChanged)
     }
 }
 
@@ -287,10 +287,11 @@ impl From<OpenError> for Problem {
                 format!(
                     "One client may have {} sessions in the store here, and {} bytes of them (a quarter of \
                      `--max-session-bytes`). Delete sessions that are done, or try again after the time in \
-                     `Retry-After`. Nothing was changed.",
+                     `Retry-After`.",
                     share.max_places, share.max_bytes
                 ),
-            ),
+            )
+            .with_effect(Effect::NothingChanged),
             OpenError::TooManyTargets { count, limit } => Self::invalid_parameter(format!(
                 "Each target counts as a session, and one client may have {limit} here (`--client-sessions`): \
                  of {count} targets follow at most {limit}."

@@ -8,18 +8,33 @@ use std::error::Error;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What details end with where a whole request is refused.
-const UNCHANGED: [&str; 3] = [
-    "Nothing was changed.",
-    "None of them was tracked.",
-    "The session is unchanged.",
-];
+/// What a refused request left as it was: the last sentence of the detail.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effect {
+    NothingChanged,
+    SessionUnchanged,
+    NoFrameTracked,
+    /// The lines that were answered before the refusal.
+    LinesCount,
+}
+
+impl Effect {
+    fn sentence(self) -> &'static str {
+        match self {
+            Self::NothingChanged => "Nothing was changed.",
+            Self::SessionUnchanged => "The session is unchanged.",
+            Self::NoFrameTracked => "None of them was tracked.",
+            Self::LinesCount => "The lines before this one count.",
+        }
+    }
+}
 
 /// What went wrong with a request.
 #[derive(Debug, Clone)]
 pub struct Problem {
     kind: Kind,
     detail: String,
+    effect: Option<Effect>,
     /// The number of the next frame, where a frame number was wrong.
     expected_frame: Option<u64>,
     /// Which frame of the request is meant, counted from 0.
@@ -35,6 +50,7 @@ impl Problem {
         Self {
             kind,
             detail: detail.into(),
+            effect: None,
             expected_frame: None,
             index: None,
             retry_after: None,
@@ -110,9 +126,9 @@ impl Problem {
     pub fn too_many_pixels(pixels: u64, limit: u64) -> Self {
         let detail = format!(
             "The frames of this request have {pixels} pixels together; at most {limit} are taken. Send fewer frames \
-             in a request. None of them was tracked."
+             in a request."
         );
-        Self::new(Kind::RequestTooCostly, detail)
+        Self::new(Kind::RequestTooCostly, detail).with_effect(Effect::NoFrameTracked)
     }
 
     /// The request has more frames than a call with these settings takes, `limit` where that is several.
@@ -139,23 +155,23 @@ impl Problem {
         self
     }
 
-    /// Says that the lines before it count, in place of what is true of a whole request that is refused.
-    pub fn after_lines(mut self) -> Self {
-        let of_all = UNCHANGED
-            .iter()
-            .find_map(|said| self.detail.strip_suffix(said));
-        self.detail = of_all.unwrap_or(&self.detail).trim_end().to_owned();
-        self.and("The lines before this one count.")
+    /// Says what the request left as it was.
+    pub fn with_effect(self, effect: Effect) -> Self {
+        Self {
+            effect: Some(effect),
+            ..self
+        }
     }
 
     /// Says which of `count` frames is meant.
     pub fn of_frame(mut self, index: usize, count: usize) -> Self {
         if count > 1 {
             self.detail = format!(
-                "Frame {} of {count} in this request: {} None of them was tracked.",
+                "Frame {} of {count} in this request: {}",
                 index + 1,
                 self.detail
             );
+            self.effect = Some(Effect::NoFrameTracked);
             self.index = Some(index);
         }
         self
@@ -219,11 +235,13 @@ impl Problem {
         instance: String,
         request_id: String,
     ) -> ProblemDocument {
+        let effect = self.effect.map(Effect::sentence);
+        let sentences = [self.detail.as_str()].into_iter().chain(effect);
         ProblemDocument {
             type_uri: self.kind.uri(base_path),
             title: self.kind.title().to_owned(),
             status: self.kind.status(),
-            detail: self.detail.clone(),
+            detail: sentences.collect::<Vec<_>>().join(" "),
             instance,
             request_id,
             expected_frame: self.expected_frame,
@@ -246,10 +264,10 @@ impl Problem {
 
 /// Makes the constructors of problems whose text is always the same.
 macro_rules! fixed {
-    ($($name:ident: $kind:ident $detail:literal;)*) => {
+    ($($name:ident: $kind:ident $detail:literal $($effect:ident)?;)*) => {
         impl Problem {
             $(pub fn $name() -> Self {
-                Self::new(Kind::$kind, $detail)
+                Self::new(Kind::$kind, $detail)$(.with_effect(Effect::$effect))?
             })*
         }
     };
@@ -294,7 +312,7 @@ fixed! {
         "This address has as many connections as one may, all of them busy. Use them again, or try again after the \
             time in `Retry-After`.";
     method_not_allowed: MethodNotAllowed "The header `Allow` lists the methods there are.";
-    body_timeout: BodyTimeout "Send the whole body faster, or a smaller frame. The session is unchanged.";
+    body_timeout: BodyTimeout "Send the whole body faster, or a smaller frame." SessionUnchanged;
 }
 
 impl IntoResponse for Problem {

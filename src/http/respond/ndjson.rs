@@ -6,7 +6,7 @@
 
 use super::json;
 use crate::http::extract::instance::Instance;
-use crate::http::problems::problem::Problem;
+use crate::http::problems::problem::{Effect, Problem};
 use crate::http::state::AppState;
 use axum::body::{Body, Bytes};
 use axum::http::header::CONTENT_TYPE;
@@ -46,7 +46,8 @@ pub async fn respond<F: FrameSequence>(
             match frames.next().await?.and_then(|answer| line(&answer)) {
                 Ok(line) => Some((line, Some(frames))),
                 Err(problem) => {
-                    let document = instance.report(&state, &problem.after_lines());
+                    let document =
+                        instance.report(&state, &problem.with_effect(Effect::LinesCount));
                     Some((line(&document).unwrap_or_default(), None))
                 }
             }
