@@ -51,7 +51,7 @@ impl RotatedView {
         let (bounds, params) = (&state.bounds, &state.params);
         let rotation = Rotation::about((particle.x, particle.y), angle);
         let window = Extractor::window(&[particle], 0.0, bounds, params);
-        self.image = rotation.apply(frame, &window, std::mem::take(&mut self.image));
+        self.image = rotation.apply_within(frame, &window, std::mem::take(&mut self.image));
         self.extractor
             .compute_channels(&self.image, &[particle], 0.0, bounds, params);
     }

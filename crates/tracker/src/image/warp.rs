@@ -50,24 +50,37 @@ impl Rotation {
         frame.map_planes(scratch, |plane, mut pixels| {
             pixels.clear();
             pixels.extend_from_slice(&plane.pixels);
-            let side = f64::from(plane.pixel_side);
-            let window = window.in_pixels_of(side);
-            let columns = covered(window.x, window.width, plane.width);
-            let (x, y) = (self.x / side, self.y / side);
-            let rotation = Self { x, y, ..*self };
-            let (step_x, step_y) = (fixed(self.cos), fixed(self.sin));
-            for row in covered(window.y, window.height, plane.height) {
-                // A pixel's centre is half a pixel from its edge.
-                let first = (columns.start as f64 + 0.5, row as f64 + 0.5);
-                let (x, y) = rotation.to_original(first);
-                let (mut x, mut y) = (fixed(x - 0.5), fixed(y - 0.5));
-                for out in &mut pixels[row * plane.width as usize..][columns.clone()] {
-                    *out = interpolated(plane, x, y);
-                    (x, y) = (x + step_x, y + step_y);
-                }
-            }
-            Plane::new(plane.size(), pixels, plane.pixel_side)
+            self.rotate_within(window, plane, pixels)
         })
+    }
+
+    /// Like [`Self::apply`], for who looks at nothing further out: any pixels may be there.
+    pub fn apply_within(&self, frame: &Frame, window: &Rect, scratch: Frame) -> Frame {
+        frame.map_planes(scratch, |plane, mut pixels| {
+            pixels.resize(plane.pixels.len(), 0);
+            self.rotate_within(window, plane, pixels)
+        })
+    }
+
+    /// Writes the rotated `plane` to `pixels`, within `window` and a pixel around it.
+    fn rotate_within(&self, window: &Rect, plane: &Plane, mut pixels: Vec<u8>) -> Plane {
+        let side = f64::from(plane.pixel_side);
+        let window = window.in_pixels_of(side);
+        let columns = covered(window.x, window.width, plane.width);
+        let (x, y) = (self.x / side, self.y / side);
+        let rotation = Self { x, y, ..*self };
+        let (step_x, step_y) = (fixed(self.cos), fixed(self.sin));
+        for row in covered(window.y, window.height, plane.height) {
+            // A pixel's centre is half a pixel from its edge.
+            let first = (columns.start as f64 + 0.5, row as f64 + 0.5);
+            let (x, y) = rotation.to_original(first);
+            let (mut x, mut y) = (fixed(x - 0.5), fixed(y - 0.5));
+            for out in &mut pixels[row * plane.width as usize..][columns.clone()] {
+                *out = interpolated(plane, x, y);
+                (x, y) = (x + step_x, y + step_y);
+            }
+        }
+        Plane::new(plane.size(), pixels, plane.pixel_side)
     }
 }
 

@@ -140,13 +140,14 @@ impl HogCells {
             *edge = self.x_edges.get(first + 1 + i);
         }
         // The sum over the pixels of each column of cells, from the window's top down to the last edge.
-        let mut columns_above = [[zero; LANES]; N];
+        let mut columns_above = [Lanes::ZERO; N];
         let row = integral.row(self.y_edges.get(0));
         let mut left = row.at(simd, left_edge);
         for i in 0..N {
             let right = row.at(simd, right_edges[i]);
+            let above = columns_above[i].load_mut::<S>();
             for register in 0..registers::<S>() {
-                columns_above[i][register] = simd.sub_f32s(right[register], left[register]);
+                above[register] = simd.sub_f32s(right[register], left[register]);
             }
             left = right;
         }
@@ -157,11 +158,12 @@ impl HogCells {
             let mut left = row.at(simd, left_edge);
             for i in 0..N {
                 let right = row.at(simd, right_edges[i]);
+                let above = columns_above[i].load_mut::<S>();
                 let cell = cells[i].load_mut::<S>();
                 for register in 0..registers::<S>() {
                     let column = simd.sub_f32s(right[register], left[register]);
-                    let sum = simd.sub_f32s(column, columns_above[i][register]);
-                    (columns_above[i][register], cell[register]) = (column, sum);
+                    let sum = simd.sub_f32s(column, above[register]);
+                    (above[register], cell[register]) = (column, sum);
                     let square = simd.mul_f32s(sum, sum);
                     cells_sum[register] = simd.add_f32s(cells_sum[register], sum);
                     squares_sum[register] = simd.add_f32s(squares_sum[register], square);
