@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use num_traits::{AsPrimitive, WrappingAdd, WrappingMul, WrappingSub};
 use pulp::{Arch, Simd};
 
 /// Added to a number below 2^51, it leaves the nearest whole number in the last bits.
@@ -59,13 +60,13 @@ pub fn area_average_simd<S: Simd>(
     let factor = source.0 / target.0;
     match factor {
         _ if source != (factor * target.0, factor * target.1) => {
-            average(luma, source, target, averages);
+            any_sizes(luma, source, target, averages)
         }
         2 => square_means::<2>(luma, width, 0..columns, averages),
         3 => square_means::<3>(luma, width, 0..columns, averages),
         4 => square_means::<4>(luma, width, 0..columns, averages),
         6 => square_means::<6>(luma, width, 0..columns, averages),
-        _ => average(luma, source, target, averages),
+        _ => any_sizes(luma, source, target, averages),
     }
 }
 
@@ -98,14 +99,30 @@ pub(crate) fn square_means<const FACTOR: usize>(
 
 /// [`area_average`] for any sizes.
 #[inline(always)]
-fn average(luma: &[u8], source: (u32, u32), target: (u32, u32), out: &mut [u8]) {
+fn any_sizes(luma: &[u8], source: (u32, u32), target: (u32, u32), out: &mut [u8]) {
+    let largest = u64::from(u8::MAX) * u64::from(source.0) * u64::from(source.1);
+    match u32::try_from(largest) {
+        Ok(_) => average::<u32>(luma, source, target, out),
+        Err(_) => average::<u64>(luma, source, target, out),
+    }
+}
+
+/// [`area_average`], where `T` holds the sum of a target pixel: 255 times the source's pixels. Sums over more columns
+/// may wrap around, and their difference is right all the same.
+#[inline(always)]
+fn average<T>(luma: &[u8], source: (u32, u32), target: (u32, u32), out: &mut [u8])
+where
+    T: WrappingAdd + WrappingMul + WrappingSub + Default + AsPrimitive<f64>,
+    u32: AsPrimitive<T>,
+{
     let (width, columns) = (source.0 as usize, target.0 as usize);
     let boundaries = boundaries(source.0, target.0);
+    let unit: T = target.0.as_();
     let divisor = Divisor::new(u64::from(source.0) * u64::from(source.1));
     let mut sums: [Vec<u32>; ROWS] = std::array::from_fn(|_| vec![0; width]);
     // The last target pixel ends at the last column's end, and of what follows it takes nothing.
-    let mut integral = vec![[0.0; ROWS]; width + 2];
-    let mut totals = vec![[0.0; ROWS]; columns];
+    let mut integral = vec![[T::default(); ROWS]; width + 2];
+    let mut totals = vec![[T::default(); ROWS]; columns];
     let mut averages = vec![[0_u8; ROWS]; columns];
     let cells = cells(source.1, target.1);
     for (cells, out) in cells.chunks(ROWS).zip(out.chunks_mut(ROWS * columns)) {
@@ -114,22 +131,23 @@ fn average(luma: &[u8], source: (u32, u32), target: (u32, u32), out: &mut [u8]) 
             sum_rows(luma, cell, target.1, sums);
         }
         integrate(&sums, &mut integral);
-        let mut begin = [0.0; ROWS];
+        let mut begin = [T::default(); ROWS];
         for (total, &(boundary, part)) in totals.iter_mut().zip(&boundaries[1..]) {
             let [before, after] = &integral[boundary as usize..].as_chunks::<2>().0[0];
-            let mut end = [0.0; ROWS];
+            let (part, mut end): (T, _) = (part.as_(), [T::default(); ROWS]);
             for row in 0..ROWS {
                 // In units of `1 / T`.
-                end[row] = before[row] * f64::from(target.0) + (after[row] - before[row]) * part;
+                let within = after[row].wrapping_sub(&before[row]).wrapping_mul(&part);
+                end[row] = before[row].wrapping_mul(&unit).wrapping_add(&within);
             }
             for row in 0..ROWS {
-                total[row] = end[row] - begin[row];
+                total[row] = end[row].wrapping_sub(&begin[row]);
             }
             begin = end;
         }
         let quotients = averages.as_flattened_mut().iter_mut();
         for (average, &total) in quotients.zip(totals.as_flattened()) {
-            *average = divisor.rounded(total);
+            *average = divisor.rounded(total.as_());
         }
         for (row, out) in out.chunks_exact_mut(columns).enumerate() {
             for (out, averages) in out.iter_mut().zip(&averages) {
@@ -160,16 +178,19 @@ fn sum_rows(luma: &[u8], cell: &Cell, height: u32, sums: &mut [u32]) {
     }
 }
 
-/// Sets each of `integral` but the first to the sums over the columns before it. They are whole numbers, and far below
-/// 2^53.
+/// Sets each of `integral` but the first to the sums over the columns before it.
 #[inline(always)]
-fn integrate(sums: &[Vec<u32>; ROWS], integral: &mut [[f64; ROWS]]) {
-    let mut total = [0.0; ROWS];
+fn integrate<T>(sums: &[Vec<u32>; ROWS], integral: &mut [[T; ROWS]])
+where
+    T: WrappingAdd + Default + Copy + 'static,
+    u32: AsPrimitive<T>,
+{
+    let mut total = [T::default(); ROWS];
     let width = sums[0].len();
     let sums = sums.each_ref().map(|sums| &sums[..width]);
     for (column, integral) in integral[1..=width].iter_mut().enumerate() {
         for row in 0..ROWS {
-            total[row] += f64::from(sums[row][column]);
+            total[row] = total[row].wrapping_add(&sums[row][column].as_());
         }
         *integral = total;
     }
@@ -177,11 +198,11 @@ fn integrate(sums: &[Vec<u32>; ROWS], integral: &mut [[f64; ROWS]]) {
 
 /// Where each target pixel begins, and where the last one ends: a source column, and how much of it lies before, in
 /// units of `1 / T`.
-fn boundaries(source: u32, target: u32) -> Vec<(u32, f64)> {
+fn boundaries(source: u32, target: u32) -> Vec<(u32, u32)> {
     let (source, target) = (u64::from(source), u64::from(target));
     (0..=target)
         .map(|index| index * source)
-        .map(|at| ((at / target) as u32, (at % target) as f64))
+        .map(|at| ((at / target) as u32, (at % target) as u32))
         .collect()
 }
 
