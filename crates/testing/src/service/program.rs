@@ -4,14 +4,12 @@ use crate::command::program;
 use crate::processes::Process;
 use crate::within::PATIENCE;
 use rustix::process::Signal;
-use std::convert::Infallible;
 use std::io::{self, BufRead, BufReader};
 use std::net::SocketAddr;
 use std::path::Path;
 use std::process::{ChildStderr, Command, Stdio};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
-use std::sync::{Arc, Mutex};
+use std::sync::Mutex;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 
 /// `bagtrack serve` on a free port; it ends with this value.
 ///
@@ -88,11 +86,6 @@ impl Program {
         self.log.lines = None;
     }
 
-    /// Nobody reads the log any more, also where it was ignored. Its pipe stays open.
-    pub fn stall_log(&self) {
-        self.log.is_stalled.store(true, Ordering::Relaxed);
-    }
-
     /// Waits until it has ended; the exit status, and the rest of the log.
     pub fn ends(mut self) -> (Option<i32>, Vec<String>) {
         let mut rest = Vec::new();
@@ -145,22 +138,19 @@ struct Log {
     /// None where it is ignored. A line is read when the one before it has been taken. Nobody waits for the lock, which
     /// lets threads share a program.
     lines: Option<Mutex<Receiver<String>>>,
-    is_stalled: Arc<AtomicBool>,
-    /// Keeps the pipe of a stalled log open.
-    _open: Sender<Infallible>,
 }
 
 impl Log {
     fn of(pipe: ChildStderr) -> Self {
         let (sender, lines) = sync_channel(0);
-        let (open, closed) = channel();
-        let is_stalled = Arc::new(AtomicBool::new(false));
-        let stalled = is_stalled.clone();
-        std::thread::spawn(move || read(pipe, &sender, &stalled, &closed));
+        std::thread::spawn(move || {
+            for line in BufReader::new(pipe).lines() {
+                // Where nobody takes it, it is dropped.
+                let _ = sender.send(line.expect("the log is text"));
+            }
+        });
         Self {
             lines: Some(Mutex::new(lines)),
-            is_stalled,
-            _open: open,
         }
     }
 
@@ -183,22 +173,6 @@ impl Log {
             if line.contains(text) {
                 return Some(line);
             }
-        }
-    }
-}
-
-fn read(
-    pipe: ChildStderr,
-    lines: &SyncSender<String>,
-    is_stalled: &AtomicBool,
-    closed: &Receiver<Infallible>,
-) {
-    for line in BufReader::new(pipe).lines() {
-        // Where nobody takes it, it is dropped.
-        let _ = lines.send(line.expect("the log is text"));
-        if is_stalled.load(Ordering::Relaxed) {
-            let _ = closed.recv();
-            return;
         }
     }
 }
