@@ -120,58 +120,6 @@ impl fmt::Display for Playback {
 mod tests {
     use super::*;
 
-    /// A box for each frame that is marked with an x.
-    fn boxes(marks: &str) -> Vec<Option<Rect>> {
-        let annotation = Rect::new(0.0, 0.0, 2.0, 2.0);
-        marks
-            .chars()
-            .map(|c| (c == 'x').then_some(annotation))
-            .collect()
-    }
-
-    fn order(backwards: bool, start_at: Option<f64>, marks: &str) -> Result<Vec<usize>, String> {
-        let playback = Playback {
-            backwards,
-            start_at,
-            ..Playback::default()
-        };
-        playback.order(&boxes(marks))
-    }
-
-    #[test]
-    fn the_default_is_every_frame_from_an_annotated_first_one() {
-        assert_eq!(order(false, None, "x-x"), Ok(vec![0, 1, 2]));
-        assert!(order(false, None, "-xx").is_err());
-    }
-
-    #[test]
-    fn backwards_begins_at_the_last_annotated_frame() {
-        assert_eq!(order(true, None, "x-x"), Ok(vec![2, 1, 0]));
-        assert_eq!(order(true, None, "-xx--"), Ok(vec![2, 1, 0]));
-    }
-
-    #[test]
-    fn a_share_is_counted_in_the_order_of_playing() {
-        // Frames 0, 1, 2 and 3 are at 0, 1/4, 1/2 and 3/4.
-        assert_eq!(order(false, Some(0.25), "xxxx"), Ok(vec![1, 2, 3]));
-        assert_eq!(order(false, Some(0.26), "xxxx"), Ok(vec![2, 3]));
-        assert_eq!(order(true, Some(0.25), "xxxx"), Ok(vec![2, 1, 0]));
-        assert_eq!(order(false, Some(0.25), "x--x"), Ok(vec![3]));
-        assert_eq!(order(false, Some(0.0), "-xx"), Ok(vec![1, 2]));
-        let error = order(false, Some(0.9), "xxx-").expect_err("there is no frame at 0.9");
-        assert!(error.contains("from 0.9"), "{error}");
-        assert!(order(true, None, "---").is_err());
-    }
-    #[test]
-    fn one_frame_in_so_many_is_counted_from_the_first_that_is_played() {
-        let playback = Playback {
-            backwards: true,
-            every: NonZeroUsize::new(2),
-            ..Playback::default()
-        };
-        assert_eq!(playback.order(&boxes("xxxxx-")), Ok(vec![4, 2, 0]));
-    }
-
     #[test]
     fn twelve_seeds_begin_with_twelve_boxes_that_are_off_by_their_share() {
         let exact = Rect::new(10.0, 20.0, 40.0, 60.0);

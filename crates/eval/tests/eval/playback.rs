@@ -57,9 +57,10 @@ fn playback(backwards: bool, start_at: Value, every: Value) -> Value {
 }
 
 #[test]
-fn one_frame_in_three_is_the_clip_with_the_others_left_out() {
-    let playback = playback(false, Value::Null, json!(3));
-    same(&["--every", "3"], (1..=12).step_by(3), &playback);
+fn one_frame_in_four_from_the_first_that_is_played_is_the_clip_with_the_others_left_out() {
+    let playback = playback(true, json!(0.1), json!(4));
+    let flags = ["--backwards", "--start-at", "0.1", "--every", "4"];
+    same(&flags, [10, 6, 2].into_iter(), &playback);
 }
 
 #[test]
