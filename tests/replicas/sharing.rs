@@ -5,55 +5,7 @@ use crate::pair::{Pair, json};
 use crate::processes::Redis;
 use crate::replica::Replica;
 use reqwest::{Client, StatusCode};
-use serde_json::Value;
 use uuid::Uuid;
-
-#[tokio::test]
-#[ignore = "needs redis"]
-async fn frames_to_both_replicas_in_turns_get_the_boxes_of_one() {
-    let pair = Pair::open(&[], 20).await;
-    let expected = pair.undisturbed().await;
-    for number in 1..20 {
-        let answer = pair.post(number % 2, number).await;
-        assert_eq!(answer.headers()["checkpoint"], number.to_string().as_str());
-        let answer = json(answer, StatusCode::OK).await;
-        assert_eq!(answer, expected[number - 1]);
-        // Sent again to the other one, which has not seen it.
-        let again = pair.post((number + 1) % 2, number).await;
-        assert_eq!(again.headers()["replayed"], "true");
-        assert_eq!(json(again, StatusCode::OK).await, answer);
-    }
-    for replica in 0..2 {
-        let view = pair.view(replica).await;
-        assert_eq!(json(view, StatusCode::OK).await["frames"], 20);
-    }
-    let early = json(pair.post_as(0, 60, 1).await, StatusCode::CONFLICT).await;
-    assert_eq!(early["expected_frame"], 20);
-}
-
-#[tokio::test]
-#[ignore = "needs redis"]
-async fn of_two_frames_with_one_number_one_wins_and_the_other_is_told_the_next_number() {
-    let pair = Pair::open(&[], 30).await;
-    for number in 1..15 {
-        let (first, second) = tokio::join!(
-            pair.post_as(0, number, number),
-            pair.post_as(1, number, 29 - number)
-        );
-        let mut won = 0;
-        for answer in [first, second] {
-            match answer.status() {
-                StatusCode::OK => won += 1,
-                StatusCode::CONFLICT => {
-                    let problem: Value = answer.json().await.unwrap();
-                    assert_eq!(problem["expected_frame"], number + 1, "{problem}");
-                }
-                status => panic!("{status}: {}", answer.text().await.unwrap()),
-            }
-        }
-        assert_eq!(won, 1, "frame {number}");
-    }
-}
 
 #[tokio::test]
 #[ignore = "needs redis"]
@@ -84,61 +36,6 @@ async fn frames_without_numbers_are_taken_in_turns_but_not_at_once() {
         let view = json(pair.view(replica).await, StatusCode::OK).await;
         assert_eq!(view["frames"], last + 1);
     }
-}
-
-#[tokio::test]
-#[ignore = "needs redis"]
-async fn an_early_frame_waits_for_those_that_go_to_the_other_replica() {
-    let pair = Pair::open(&[], 12).await;
-    let expected = pair.undisturbed().await;
-    for first in [1, 4, 7] {
-        let (third, second, first_answer) = tokio::join!(
-            pair.post(0, first + 2),
-            async {
-                // The third is at its replica by then, or comes in time.
-                json(pair.view(1).await, StatusCode::OK).await;
-                pair.post(1, first + 1).await
-            },
-            async {
-                json(pair.view(0).await, StatusCode::OK).await;
-                json(pair.view(1).await, StatusCode::OK).await;
-                pair.post(first % 2, first).await
-            }
-        );
-        for (number, answer) in [
-            (first, first_answer),
-            (first + 1, second),
-            (first + 2, third),
-        ] {
-            let answer = json(answer, StatusCode::OK).await;
-            assert_eq!(answer, expected[number - 1]);
-        }
-    }
-}
-
-#[tokio::test]
-#[ignore = "needs redis"]
-async fn a_refused_frame_does_not_keep_a_session_in_the_store() {
-    let pair = Pair::open(&["--session-first", "3s", "--session-idle", "3s"], 3).await;
-    let opened = std::time::Instant::now();
-    let refused = |replica: usize| {
-        let request = pair.client.post(pair.url(replica, "/frames?frame=9"));
-        request.body(pair.clip.frames[1].clone()).send()
-    };
-    let mut count = 0;
-    let gone = loop {
-        let answer = refused(count % 2).await.unwrap();
-        count += 1;
-        match answer.status() {
-            StatusCode::CONFLICT => assert!(opened.elapsed().as_secs() < 10, "it lives on"),
-            status => break status,
-        }
-    };
-    assert!(count > 1);
-    assert!(
-        matches!(gone, StatusCode::GONE | StatusCode::NOT_FOUND),
-        "{gone}"
-    );
 }
 
 #[tokio::test]
