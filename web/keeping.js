@@ -215,7 +215,7 @@ export class Keeping {
     };
     // Another tab may have it open where browsers do not tell: then this one has a copy.
     const own = isOwn || navigator.locks ? id : undefined;
-    await this.page.choose(open, (run) => this.resume(run, project, states, own));
+    await this.page.opening.choose(open, (run) => this.resume(run, project, states, own));
     if (this.id !== id) giveUp(id);
   }
 

@@ -13,12 +13,12 @@ const page = new Page();
 const keeping = new Keeping(page);
 
 page.changed = () => keeping.changed();
-page.mayLeave = () => keeping.leave();
-page.arrived = () => keeping.arrived();
+page.opening.mayLeave = () => keeping.leave();
+page.opening.arrived = () => keeping.arrived();
 page.letGoOn = () => keeping.letGoOn();
 keeping.begin();
 offerSources(
-  (open) => page.choose(open),
+  (open) => page.opening.choose(open),
   (files) => keeping.take(files),
 );
 offerSaving(page);

@@ -2,16 +2,15 @@
 
 import { Beginning } from "./begin.js";
 import { shownIn } from "./boxes.js";
-import { button, canvas, get, input } from "./dom.js";
-import { DRAW, Editing, TAP, again } from "./editing.js";
+import { button, canvas, get } from "./dom.js";
+import { Editing } from "./editing.js";
 import { LocalClient } from "./js/local.js";
 import { Problem } from "./js/problem.js";
 import { FOLLOWING, GO_ON, Message } from "./message.js";
+import { Opening } from "./opening.js";
 import { Player } from "./player.js";
-import { UnplayableError, words } from "./problems.js";
-import { prepareSaving } from "./saving.js";
+import { words } from "./problems.js";
 import { Seen } from "./seen.js";
-import { offerDecoding } from "./sources.js";
 import { Stage } from "./stage.js";
 import { Timeline } from "./timeline.js";
 
@@ -19,9 +18,6 @@ import { Timeline } from "./timeline.js";
  * @typedef {import("./js/bagtrack.js").Box} Box
  * @typedef {import("./run.js").Run} Run
  * @typedef {import("./source.js").Picture} Picture
- * @typedef {import("./source.js").Source} Source
- *
- * @typedef {(run: Run) => Promise<boolean>} Resume Brings back what was tracked in a source, and says whether it did.
  *
  * @typedef {"start" | "opening" | "first" | "following" | "paused" | "ended"} State `first` waits for the first box;
  *   from `following` on there are rows. What is shown in which state stands in the page, in `data-in` and `data-on`.
@@ -37,6 +33,7 @@ export class Page {
     this.timeline = new Timeline(canvas("timeline"), (frame) => this.seek(frame));
     this.seen = new Seen();
     this.editing = new Editing(this);
+    this.opening = new Opening(this);
     this.beginning = new Beginning(this);
     this.player = new Player(this);
     /** @type {Run | undefined} */
@@ -52,17 +49,10 @@ export class Page {
     /** Whether there are results that were not saved. */
     this.isUnsaved = false;
     this.hasKey = false;
-    /** Counts the choices: one that is overtaken by another is dropped. */
-    this.choice = 0;
-    this.opening = new AbortController();
     /** @type {(() => void) | undefined} Makes anew what failed for want of a key. */
     this.again = undefined;
     /** Is told when rows or objects have changed. */
     this.changed = () => {};
-    /** Keeps what is here, and says whether another source may take its place. */
-    this.mayLeave = async () => true;
-    /** Is told that another source is here, and says what is to be said of the one before it. */
-    this.arrived = () => "";
     /** Lets a run that has stopped go on later. */
     this.letGoOn = () => {};
     /** @type {State} */
@@ -144,52 +134,6 @@ export class Page {
     this.changed();
     if (this.canGoOn) this.fail(error, () => this.player.goOn(), GO_ON);
     else this.fail(error, undefined, " Choose the video or the camera again.");
-  }
-
-  /** Shows the first frame of a source and asks for a box. What was there before stays until then.
-   * @param {(signal: AbortSignal) => Promise<Source>} open Its signal says that another choice has overtaken it.
-   * @param {Resume} [resume] */
-  async choose(open, resume) {
-    const own = (this.choice += 1);
-    this.opening.abort();
-    this.opening = new AbortController();
-    get("decoding").hidden = true;
-    if (!this.run) this.enter("opening");
-    this.say("Opening…");
-    try {
-      const [source, { Run }] = await Promise.all([open(this.opening.signal), import("./run.js")]);
-      const first = await source.first();
-      const isLocal = input("here").checked;
-      const client = isLocal ? this.local : await this.service();
-      const mayLeave = own === this.choice && (await this.mayLeave());
-      if (own !== this.choice || !mayLeave) {
-        source.stop();
-        source.close?.();
-        if (own === this.choice) this.say(`${this.run?.source.name} stays.`);
-        return;
-      }
-      this.reset();
-      if (isLocal) this.local.warm().catch(() => undefined);
-      this.run = new Run(client, source, first, this.told());
-      this.run.sees = this.seen.isOn;
-      this.stage.draw(undefined);
-      this.stage.show(first.image);
-      prepareSaving();
-      again().catch(() => undefined);
-      this.service().catch(() => undefined);
-      this.seen.prepare().catch(() => undefined);
-      if (await resume?.(this.run)) return;
-      this.enter("first");
-      this.beginning.reset();
-      this.preview();
-      get("picture").scrollIntoView({ block: "nearest" });
-      this.say(TAP + DRAW + (source.note ?? "") + this.arrived());
-    } catch (error) {
-      if (own !== this.choice) return;
-      if (!this.run) this.enter("start");
-      this.fail(error, () => this.choose(open, resume));
-      if (error instanceof UnplayableError) offerDecoding(this, error.file, resume);
-    }
   }
 
   reset() {

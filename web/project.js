@@ -178,7 +178,7 @@ async function takeVideo(keeping, run, files) {
   };
   const resume = async (/** @type {Run} */ opened) =>
     !unlike(opened.source, project) && keeping.resume(opened, project, states, id);
-  await keeping.page.choose(open, resume);
+  await keeping.page.opening.choose(open, resume);
 }
 
 /**
@@ -193,7 +193,7 @@ async function openProject(keeping, file, files) {
     project = readProject(parsed(await file.text(), file.name));
     return files.length > 0 ? fitting(await openFiles(files), project) : withoutVideo(project);
   };
-  await keeping.page.choose(open, (run) => keeping.resume(run, project, {}));
+  await keeping.page.opening.choose(open, (run) => keeping.resume(run, project, {}));
 }
 
 /** @param {string} text

@@ -1,10 +1,10 @@
 // One run: a source of frames, the objects that are followed through them, and the answers.
 
 import { rowOf } from "./boxes.js";
+import { sendDrawn } from "./drawn.js";
 import { WINDOW, followerOf } from "./follower.js";
 import { Frames, Pace, close } from "./frames.js";
 import { LocalClient } from "./js/local.js";
-import { Problem } from "./js/problem.js";
 import { FollowedObject } from "./objects.js";
 
 /**
@@ -57,8 +57,7 @@ export class Run {
     this.failure = undefined;
     /** @type {{picture: Picture, at: number}[]} Frames without an answer, oldest first. */
     this.underWay = [];
-    /** @type {{box: Box, object: FollowedObject | undefined, isSent?: boolean} | undefined} A box that was drawn, until
-     * it is answered: for an object, or for a new one. It is sent once the frames on their way are answered. */
+    /** @type {import("./drawn.js").Drawn | undefined} */
     this.drawn = undefined;
     /** @type {(() => Promise<void>) | undefined} Goes on with a run that was brought back, or stopped. */
     this.wake = undefined;
@@ -90,7 +89,7 @@ export class Run {
   /** Takes the frames after the last one. */
   play() {
     this.isResting = false;
-    this.sendDrawn();
+    sendDrawn(this);
     const end = () => {
       this.hasAll = true;
       this.checkEnd();
@@ -208,7 +207,7 @@ export class Run {
     this.told.answer(picture, this.chosen && answers[objects.indexOf(this.chosen)]);
     // It is not shown any more.
     if (before.image !== picture.image) close(before);
-    this.sendDrawn();
+    sendDrawn(this);
     this.checkEnd();
   }
 
@@ -233,42 +232,7 @@ export class Run {
    * @param {FollowedObject | undefined} object */
   draw(box, object) {
     this.drawn = { box, object };
-    this.sendDrawn();
-  }
-
-  async sendDrawn() {
-    const { drawn, picture } = this;
-    if (!drawn || this.underWay.length > 0) return this.throttle();
-    const { box, object } = drawn;
-    const sent = { picture, at: performance.now() };
-    this.underWay.push(sent);
-    let isLeft = false;
-    try {
-      // Until then no frame is sent: a new object would not know it. A correction is tracked before those behind it.
-      if (!object) await this.add(box);
-      const asked = object?.follower.track(picture, { box });
-      drawn.isSent = asked !== undefined;
-      this.throttle();
-      const answer = await asked;
-      if (object && answer) {
-        this.note(object, answer, picture, true);
-        this.told.answer(picture, answer);
-      }
-      isLeft = this.isResting && object !== undefined && !answer;
-    } catch (error) {
-      // An object that cannot be added, or a box that cannot be followed, is no end of what is followed.
-      const isRefused = !object || (error instanceof Problem && error.slug === "invalid-box");
-      if (isRefused && !this.isOver) this.told.refuse(error);
-      else this.fail(error);
-      isLeft = !isRefused;
-    }
-    this.underWay = this.underWay.filter((other) => other !== sent);
-    // What is left comes again where one goes on.
-    drawn.isSent = false;
-    if (this.drawn === drawn && !isLeft) this.drawn = undefined;
-    if (isLeft) this.throttle();
-    else this.sendDrawn();
-    this.checkEnd();
+    sendDrawn(this);
   }
 
   /** Tracks frames again while no other ones are tracked.

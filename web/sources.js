@@ -65,7 +65,7 @@ async function filesIn(entry) {
 /** Offers to have a file decoded by the service: it is uploaded for that.
  * @param {import("./page.js").Page} page
  * @param {File} file
- * @param {import("./page.js").Resume} [resume] */
+ * @param {import("./opening.js").Resume} [resume] */
 export function offerDecoding(page, file, resume) {
   get("decoding").hidden = false;
   // What is said may be of another video by now.
@@ -78,7 +78,7 @@ export function offerDecoding(page, file, resume) {
       const { key } = (await page.service()).transport;
       return (await import("./decoded.js")).openDecoded(file, key, tell, signal);
     };
-    page.choose(open, resume);
+    page.opening.choose(open, resume);
   };
   button("decode").focus();
 }

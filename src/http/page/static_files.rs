@@ -49,7 +49,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 73] = [
+const FILES: [File; 75] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("again.js", SCRIPT),
@@ -62,6 +62,7 @@ const FILES: [File; 73] = [
     file!("decoder.js", SCRIPT),
     file!("delivery.js", SCRIPT),
     file!("dom.js", SCRIPT),
+    file!("drawn.js", SCRIPT),
     file!("editing.js", SCRIPT),
     file!("file.js", SCRIPT),
     file!("follower.js", SCRIPT),
@@ -77,6 +78,7 @@ const FILES: [File; 73] = [
     file!("matroska.js", SCRIPT),
     file!("message.js", SCRIPT),
     file!("objects.js", SCRIPT),
+    file!("opening.js", SCRIPT),
     file!("page.js", SCRIPT),
     file!("particles.js", SCRIPT),
     file!("playback.js", SCRIPT),

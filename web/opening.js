@@ -1,0 +1,84 @@
+// Opening a source. What was there before stays until its first frame is there, and the last choice counts.
+
+import { get, input } from "./dom.js";
+import { DRAW, TAP, again } from "./editing.js";
+import { UnplayableError } from "./problems.js";
+import { prepareSaving } from "./saving.js";
+import { offerDecoding } from "./sources.js";
+
+/**
+ * @typedef {import("./run.js").Run} Run
+ * @typedef {import("./source.js").Source} Source
+ *
+ * @typedef {(run: Run) => Promise<boolean>} Resume Brings back what was tracked in a source, and says whether it did.
+ */
+
+export class Opening {
+  /** @param {import("./page.js").Page} page */
+  constructor(page) {
+    this.page = page;
+    /** Counts the choices: one that is overtaken by another is dropped. */
+    this.choice = 0;
+    this.overtaken = new AbortController();
+    /** Keeps what is here, and says whether another source may take its place. */
+    this.mayLeave = async () => true;
+    /** Is told that another source is here, and says what is to be said of the one before it. */
+    this.arrived = () => "";
+  }
+
+  /** Shows the first frame of a source and asks for a box. What was there before stays until then.
+   * @param {(signal: AbortSignal) => Promise<Source>} open Its signal says that another choice has overtaken it.
+   * @param {Resume} [resume] */
+  async choose(open, resume) {
+    const { page } = this;
+    const own = (this.choice += 1);
+    this.overtaken.abort();
+    this.overtaken = new AbortController();
+    get("decoding").hidden = true;
+    if (!page.run) page.enter("opening");
+    page.say("Opening…");
+    try {
+      const [source, { Run }] = await Promise.all([open(this.overtaken.signal), import("./run.js")]);
+      const first = await source.first();
+      const isLocal = input("here").checked;
+      const client = isLocal ? page.local : await page.service();
+      const mayLeave = own === this.choice && (await this.mayLeave());
+      if (own !== this.choice || !mayLeave) {
+        source.stop();
+        source.close?.();
+        if (own === this.choice) page.say(`${page.run?.source.name} stays.`);
+        return;
+      }
+      await this.take(new Run(client, source, first, page.told()), resume);
+    } catch (error) {
+      if (own !== this.choice) return;
+      if (!page.run) page.enter("start");
+      page.fail(error, () => this.choose(open, resume));
+      if (error instanceof UnplayableError) offerDecoding(page, error.file, resume);
+    }
+  }
+
+  /** Puts a run in the place of the one before, and loads what it will need.
+   * @param {Run} run
+   * @param {Resume} [resume] */
+  async take(run, resume) {
+    const { page } = this;
+    const { picture, source } = run;
+    page.reset();
+    page.run = run;
+    run.sees = page.seen.isOn;
+    page.stage.draw(undefined);
+    page.stage.show(picture.image);
+    if (run.isLocal) page.local.warm().catch(() => undefined);
+    prepareSaving();
+    again().catch(() => undefined);
+    page.service().catch(() => undefined);
+    page.seen.prepare().catch(() => undefined);
+    if (await resume?.(run)) return;
+    page.enter("first");
+    page.beginning.reset();
+    page.preview();
+    get("picture").scrollIntoView({ block: "nearest" });
+    page.say(TAP + DRAW + (source.note ?? "") + this.arrived());
+  }
+}
