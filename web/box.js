@@ -48,6 +48,11 @@ export class BoxDrawing {
   arm(isArmed) {
     this.isArmed = isArmed;
     this.told.arm(isArmed);
+    if (!isArmed) return;
+    // There arrows move the box.
+    this.canvas.focus({ preventScroll: true });
+    const { top, bottom } = this.canvas.getBoundingClientRect();
+    if (bottom < 0 || top > innerHeight) this.canvas.scrollIntoView();
   }
 
   /** @param {PointerEvent} event */

@@ -18,8 +18,8 @@ export class ObjectList {
   constructor(place, told) {
     this.place = place;
     this.told = told;
-    /** @type {FollowedObject[]} */
-    this.objects = [];
+    /** @type {Map<FollowedObject, HTMLElement>} */
+    this.items = new Map();
   }
 
   /**
@@ -27,64 +27,87 @@ export class ObjectList {
    * @param {FollowedObject | undefined} chosen
    */
   show(objects, chosen) {
-    const isSame = objects.length === this.objects.length && objects.every((object, at) => object === this.objects[at]);
-    if (!isSame) this.place.replaceChildren(...objects.map((object) => this.item(object)));
-    this.objects = [...objects];
-    [...this.place.children].forEach((item, at) => item.classList.toggle("chosen", objects[at] === chosen));
-    this.place.querySelectorAll("input[type=radio]").forEach((radio, at) => {
+    const { items, place } = this;
+    for (const [object, item] of items) if (!objects.includes(object)) this.remove(object, item);
+    objects.forEach((object, at) => {
+      if (items.has(object)) return;
+      items.set(object, this.item(object));
+      place.insertBefore(/** @type {HTMLElement} */ (items.get(object)), place.children[at]);
+    });
+    [...place.children].forEach((item, at) => item.classList.toggle("chosen", objects[at] === chosen));
+    place.querySelectorAll("input[type=radio]").forEach((radio, at) => {
       /** @type {HTMLInputElement} */ (radio).checked = objects[at] === chosen;
     });
+  }
+
+  /** Where it had the focus, the one beside it gets that.
+   * @param {FollowedObject} object
+   * @param {HTMLElement} item */
+  remove(object, item) {
+    const beside = item.nextElementSibling ?? item.previousElementSibling;
+    const hadFocus = item.contains(document.activeElement);
+    item.remove();
+    this.items.delete(object);
+    if (hadFocus) /** @type {HTMLElement | null} */ (beside?.lastElementChild)?.focus();
   }
 
   /** @param {FollowedObject} object */
   item(object) {
     const item = document.createElement("li");
     item.style.setProperty("--color", object.color);
-    const radio = input("radio", `Choose ${object.name}`);
+    const [radio, name, shown] = [input("radio"), input("text"), input("checkbox")];
+    const doubt = button("doubt", () => this.told.doubt(object));
+    const remove = button("remove", () => this.told.remove(object));
+    const label = () => {
+      tell(radio, `Choose ${object.name}`);
+      tell(shown, `Show ${object.name}`);
+      tell(doubt, `Next doubtful frame of ${object.name}`);
+      tell(remove, `Delete ${object.name}`);
+    };
+    label();
     radio.name = "object";
     radio.addEventListener("change", () => this.told.choose(object));
-    const name = input("text", "Name");
+    name.setAttribute("aria-label", "Name");
+    name.dir = "auto";
     name.value = object.name;
     name.addEventListener("input", () => {
       object.name = name.value;
+      label();
       this.told.change();
     });
-    const shown = input("checkbox", `Show ${object.name}`);
     shown.checked = object.isShown;
     shown.addEventListener("change", () => {
       object.isShown = shown.checked;
       this.told.change();
     });
-    const doubt = button("doubt", `Next doubtful frame of ${object.name}`, () => this.told.doubt(object));
-    const remove = button("remove", `Delete ${object.name}`, () => this.told.remove(object));
     item.append(radio, name, shown, doubt, remove);
     return item;
   }
 }
 
-/**
- * @param {string} type
- * @param {string} label
- */
-function input(type, label) {
+/** Says what a control does.
+ * @param {HTMLElement} control
+ * @param {string} text */
+function tell(control, text) {
+  control.setAttribute("aria-label", text);
+  control.title = text;
+}
+
+/** @param {string} type */
+function input(type) {
   const element = document.createElement("input");
   element.type = type;
-  element.setAttribute("aria-label", label);
-  if (type !== "text") element.title = label;
   return element;
 }
 
 /**
  * @param {string} icon
- * @param {string} label
  * @param {() => void} act
  */
-function button(icon, label, act) {
+function button(icon, act) {
   const element = document.createElement("button");
   element.type = "button";
   element.className = `icon quiet ${icon}`;
-  element.setAttribute("aria-label", label);
-  element.title = label;
   element.addEventListener("click", act);
   return element;
 }

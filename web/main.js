@@ -24,11 +24,7 @@ offerSources(
 offerSaving(page);
 playWelcome();
 
-get("draw").addEventListener("click", () => {
-  page.editing.drawing.arm(!page.editing.drawing.isArmed);
-  // There arrows move the box.
-  if (page.editing.drawing.isArmed) get("picture").focus({ preventScroll: true });
-});
+get("draw").addEventListener("click", () => page.editing.drawing.arm(!page.editing.drawing.isArmed));
 get("pause").addEventListener("click", () => page.player.press());
 get("resume").addEventListener("click", () => page.player.goOn());
 get("add").addEventListener("click", () => page.editing.toggleAdding());

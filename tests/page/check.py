@@ -18,6 +18,7 @@ import time
 import urllib.parse
 
 import budgets
+import controls
 import corrected
 import files
 import kept
@@ -424,6 +425,7 @@ ALL = [
     key_needed,
     busy_service,
     *budgets.ALL,
+    *controls.ALL,
     *corrected.ALL,
     *files.ALL,
     *local.ALL,

@@ -1,0 +1,58 @@
+"""Keyboards and fingers."""
+
+import json
+
+from browser import choose, drag, frames, saved
+
+FOCUS = "document.activeElement.getAttribute('aria-label') ?? document.activeElement.id"
+
+
+def add_by_keyboard(page, *keys):
+    """Adds an object: the focus goes to the picture, and the picture to where it is seen."""
+    page.locator("#add").focus()
+    page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.id") == "picture"
+    area = page.locator("#picture").bounding_box()
+    assert area["y"] < page.viewport_size["height"] and area["y"] + area["height"] > 0, area
+    count = page.locator("#list li").count()
+    for key in ("Enter", *keys, "Enter"):
+        page.keyboard.press(key)
+    page.locator("#list li").nth(count).wait_for()
+
+
+def objects_by_keyboard(checks):
+    """Who adds, names and deletes objects by keyboard, on a laptop at 150 %, stays where they are in the list, and is
+    told the names that objects have."""
+    page = checks.page(where="here", viewport={"width": 911, "height": 433}, device_scale_factor=1.5, locale="he-IL")
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 5)
+    page.keyboard.press("Space")
+    for count in range(3):
+        add_by_keyboard(page, *["ArrowLeft"] * 4 * count)
+    names = page.locator("#list input[type=text]")
+    for at, name in enumerate(("van", "שלום", "bus", "cat")):
+        names.nth(at).focus()
+        page.keyboard.press("Control+a")
+        page.keyboard.type(name)
+    told = [page.locator("#list button.remove").nth(at).get_attribute("aria-label") for at in range(4)]
+    assert told == ["Delete van", "Delete שלום", "Delete bus", "Delete cat"], told
+    page.locator("#list button.remove").nth(1).focus()
+    for left in ("bus", "cat"):
+        page.keyboard.press("Enter")
+        page.get_by_label(f"Delete {left}").wait_for()
+        assert page.evaluate(FOCUS) == f"Delete {left}", page.evaluate(FOCUS)
+    # An object that comes back does not take the focus from a name.
+    page.locator("#undo").focus()
+    page.keyboard.press("Enter")
+    names.nth(1).focus()
+    page.keyboard.type("!")
+    page.locator("#list li").nth(2).wait_for()
+    page.keyboard.type("?")
+    stored = json.loads(saved(page, "#save-project"))["objects"]
+    assert sorted(found["name"] for found in stored) == ["bus", "cat!?", "van"], stored
+    checks.no_axe_violations(page, "objects")
+    page.context.close()
+
+
+ALL = [objects_by_keyboard]
