@@ -9,13 +9,18 @@ const TEXT = "input:not([type=radio], [type=checkbox], [type=range])";
 const ARROWS = "input, pre";
 const SPACE = "input, button, a, summary";
 
+/** A key as it is on a Latin keyboard: others have letters of their own on it.
+ * @param {KeyboardEvent} event */
+const keyOf = ({ key, code }) => (key > "~" && key.length === 1 && code.startsWith("Key") ? code[3].toLowerCase() : key);
+
 /**
  * @param {KeyboardEvent} event
  * @param {Page} page
  * @param {(by: number) => void} step Shows the frame before or after.
  */
 export function press(event, page, step) {
-  const { target, key, defaultPrevented } = event;
+  const { target, defaultPrevented } = event;
+  const key = keyOf(event);
   const isIn = (/** @type {string} */ controls) => target instanceof Element && target.closest(controls) !== null;
   // While a box is moved, the keys are its own.
   if (!page.run || defaultPrevented || isIn(TEXT) || page.editing.drawing.box) return;
@@ -27,8 +32,8 @@ export function press(event, page, step) {
   if (isUndoing) page.editing.undo();
   else if (isChord) return;
   else if (isSpace) button("pause").click();
-  else if (key === "d" || (isArrow && key === "ArrowLeft")) step(-1);
-  else if (key === "f" || (isArrow && key === "ArrowRight")) step(1);
+  else if (key.toLowerCase() === "d" || (isArrow && key === "ArrowLeft")) step(-1);
+  else if (key.toLowerCase() === "f" || (isArrow && key === "ArrowRight")) step(1);
   else return;
   event.preventDefault();
 }

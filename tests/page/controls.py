@@ -2,7 +2,8 @@
 
 import json
 
-from browser import choose, drag, frames, saved
+from browser import choose, drag, frames, said, saved, to_the_end
+from studio import shown, to_frame
 
 FOCUS = "document.activeElement.getAttribute('aria-label') ?? document.activeElement.id"
 
@@ -55,4 +56,27 @@ def objects_by_keyboard(checks):
     page.context.close()
 
 
-ALL = [objects_by_keyboard]
+def keyboard_of_other_letters(checks):
+    """Shortcuts are where they are on a Latin keyboard: Ctrl+Z undoes, though the key is a я; so with Caps Lock."""
+    page = checks.page(where="here")
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    to_the_end(page)
+    keys = page.context.new_cdp_session(page)
+
+    def press(key, code, modifiers=0):
+        for kind in ("keyDown", "keyUp"):
+            keys.send("Input.dispatchKeyEvent", {"type": kind, "key": key, "code": code, "modifiers": modifiers})
+
+    to_frame(page, 140)
+    for key, code, frame in (("в", "KeyD", 139), ("а", "KeyF", 140), ("D", "KeyD", 139)):
+        press(key, code)
+        shown(page, frame)
+    drag(page, [20, 20, 60, 60])
+    said(page, "Followed anew from frame 139")
+    press("я", "KeyZ", modifiers=2)
+    said(page, "is undone")
+    page.context.close()
+
+
+ALL = [objects_by_keyboard, keyboard_of_other_letters]
