@@ -30,6 +30,8 @@ export class BoxDrawing {
     this.from = undefined;
     /** @type {Box | undefined} */
     this.box = undefined;
+    /** The pointer that draws: others touch the picture, too. */
+    this.pointer = -1;
     /** Whether a finger draws. */
     this.isArmed = false;
     canvas.addEventListener("click", (event) => {
@@ -39,7 +41,7 @@ export class BoxDrawing {
     canvas.addEventListener("pointerdown", (event) => this.down(event));
     canvas.addEventListener("pointermove", (event) => this.move(event));
     canvas.addEventListener("pointerup", (event) => this.up(event));
-    canvas.addEventListener("pointercancel", () => this.cancel());
+    canvas.addEventListener("pointercancel", ({ pointerId }) => pointerId === this.pointer && this.cancel());
     canvas.addEventListener("keydown", (event) => this.key(event));
   }
 
@@ -69,13 +71,14 @@ export class BoxDrawing {
     if (event.pointerType === "touch" && !this.isArmed) return;
     if (event.button !== 0 || this.from || !this.told.start()) return;
     this.canvas.setPointerCapture(event.pointerId);
+    this.pointer = event.pointerId;
     this.from = this.at(event);
     this.box = undefined;
   }
 
   /** @param {PointerEvent} event */
   move(event) {
-    if (!this.from) return;
+    if (!this.from || event.pointerId !== this.pointer) return;
     const to = this.at(event);
     this.box = {
       x: Math.min(this.from.x, to.x),
@@ -88,7 +91,7 @@ export class BoxDrawing {
 
   /** @param {PointerEvent} event */
   up(event) {
-    if (!this.from) return;
+    if (!this.from || event.pointerId !== this.pointer) return;
     this.move(event);
     this.from = undefined;
     const box = this.box;

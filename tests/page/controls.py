@@ -1,10 +1,11 @@
-"""Keyboards and fingers."""
+"""Keyboards and fingers: where the focus goes, keys of other letters, a second finger."""
 
 import json
 
-from browser import choose, drag, frames, said, saved, to_the_end
+from browser import choose, corners, drag, frames, said, saved, to_the_end
 from studio import shown, to_frame
 
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True, "device_scale_factor": 2}
 FOCUS = "document.activeElement.getAttribute('aria-label') ?? document.activeElement.id"
 
 
@@ -79,4 +80,32 @@ def keyboard_of_other_letters(checks):
     page.context.close()
 
 
-ALL = [objects_by_keyboard, keyboard_of_other_letters]
+def second_finger(checks):
+    """A hand that touches the picture while a finger draws changes nothing of the box, and does not end it."""
+    page = checks.page(where="here", **PHONE)
+    choose(page, "card")
+    page.locator("#draw").tap()
+    page.locator("#picture").scroll_into_view_if_needed()
+    truth = checks.clips["card"]["truth"][0]
+    (left, top), (right, bottom) = corners(page, truth)
+    touch = page.context.new_cdp_session(page)
+
+    def touched(kind, **fingers):
+        touches = [{"x": x, "y": y, "id": len(name)} for name, (x, y) in fingers.items()]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touches})
+
+    touched("touchStart", one=(left, top))
+    touched("touchMove", one=(right - 5, bottom - 5))
+    touched("touchStart", one=(right - 5, bottom - 5), other=(right + 60, bottom + 60))
+    touched("touchMove", one=(right, bottom), other=(right + 70, bottom + 70))
+    # What is told of is lifted.
+    touched("touchEnd", other=(right + 70, bottom + 70))
+    assert page.locator("body[data-state=first]").count() == 1, "the second finger has ended the box"
+    touched("touchEnd")
+    frames(page, 5)
+    row = json.loads(saved(page, "#save-project"))["objects"][0]["rows"][0]
+    assert all(abs(drawn - side) < 4 for drawn, side in zip(row[2:6], truth)), (row, truth)
+    page.context.close()
+
+
+ALL = [objects_by_keyboard, keyboard_of_other_letters, second_finger]
