@@ -42,6 +42,8 @@ export class UnplayableError extends Error {
 export function words(error, hasKey) {
   if (error instanceof Problem && error.slug === "unauthorized" && !hasKey) return "This service asks for an API key.";
   if (error instanceof Problem) return WORDS[error.slug] ?? error.message;
+  // The page loads its parts when they are needed. Browsers have words of their own where one does not come.
+  if (error instanceof TypeError && /import/i.test(error.message)) return WORDS.unreachable;
   if (error instanceof Error) return WORDS[error.name] ?? error.message;
   return String(error);
 }

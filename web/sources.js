@@ -89,7 +89,12 @@ export function offerDecoding(page, file, resume) {
  */
 export function offerSources(choose, take) {
   const open = async (/** @type {File[]} */ files) => {
-    if (files.length > 0 && !(await take(files))) choose(() => openFiles(files));
+    if (files.length === 0) return;
+    try {
+      if (!(await take(files))) choose(() => openFiles(files));
+    } catch (error) {
+      choose(() => Promise.reject(error));
+    }
   };
   for (const kind of ["pointerover", "focusin", "dragenter"]) {
     addEventListener(kind, () => modules().catch(() => undefined), { once: true });
@@ -101,10 +106,13 @@ export function offerSources(choose, take) {
     choose(async () => (await modules())[2].openCamera(get("stage")));
   });
   for (const id of ["file", "folder"]) {
-    input(id).addEventListener("change", () => {
+    const chosen = () => {
       open([...(input(id).files ?? [])]);
       input(id).value = "";
-    });
+    };
+    input(id).addEventListener("change", chosen);
+    // Over a slow line one may have chosen before.
+    chosen();
   }
   for (const kind of ["dragover", "dragleave", "drop"]) {
     addEventListener(kind, async (event) => {

@@ -22,6 +22,7 @@ import controls
 import corrected
 import files
 import kept
+import line
 import local
 import quickstart
 import sources
@@ -428,6 +429,7 @@ ALL = [
     *controls.ALL,
     *corrected.ALL,
     *files.ALL,
+    *line.ALL,
     *local.ALL,
     *kept.ALL,
     *quickstart.ALL,

@@ -1,0 +1,38 @@
+"""A slow line, and one that is gone before the page has all of its parts."""
+
+from browser import DRAW, said
+from clips import H264
+
+
+def chosen_before_the_page_is_loaded(checks):
+    """A file that is chosen while the page's scripts are on their way is opened once they are there."""
+    page = checks.page(where="here")
+    under_way = []
+    page.route("**/page/main.js", lambda route: under_way.append(route))
+    page.goto(checks.service.url + "/", wait_until="commit")
+    page.locator("#file").set_input_files(checks.files.file("clip.mp4", 30, H264))
+    while not under_way:
+        page.wait_for_timeout(50)
+    under_way[0].fallback()
+    said(page, DRAW)
+    page.context.close()
+
+
+def service_gone_before_a_choice(checks):
+    """Where the service has gone since the page was loaded, a choice says so, and works once it is back."""
+    for part, choose in (
+        ("project", lambda page: page.locator("#file").set_input_files(checks.files.file("clip.mp4", 30, H264))),
+        ("run", lambda page: page.locator("#file").set_input_files(checks.files.file("clip.mp4", 30, H264))),
+        ("clip", lambda page: page.locator("#card").click()),
+    ):
+        page = checks.page(where="here", allowed=("Failed to load",))
+        page.route(f"**/page/{part}.js", lambda route: route.abort())
+        choose(page)
+        said(page, "The service cannot be reached")
+        page.unroute(f"**/page/{part}.js")
+        choose(page)
+        said(page, DRAW)
+        page.context.close()
+
+
+ALL = [chosen_before_the_page_is_loaded, service_gone_before_a_choice]
