@@ -86,7 +86,7 @@ export class Camera {
       };
       video.requestVideoFrameCallback(next);
       const [track] = this.stream.getVideoTracks();
-      track.onended = () => reject(new DOMException("", "NotReadableError"));
+      track.onended = () => reject(new DOMException("", "CameraNotReadableError"));
     });
   }
 
@@ -106,9 +106,11 @@ export class Camera {
 export async function openCamera(place) {
   // Over plain HTTP there is no way to the camera, except at the machine itself.
   if (!isSecureContext) throw new DOMException("", "SecurityError");
-  if (!navigator.mediaDevices) throw new DOMException("", "NotFoundError");
+  if (!navigator.mediaDevices) throw new DOMException("", "CameraNotFoundError");
   const wanted = { width: { ideal: 640 }, height: { ideal: 480 }, facingMode: "environment" };
-  const stream = await navigator.mediaDevices.getUserMedia({ video: wanted });
+  const stream = await navigator.mediaDevices.getUserMedia({ video: wanted }).catch(({ name, message }) => {
+    throw new DOMException(message, `Camera${name}`);
+  });
   const video = addVideo(place);
   const ready = loaded(video);
   video.srcObject = stream;

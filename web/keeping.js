@@ -5,7 +5,7 @@ import { get, input } from "./dom.js";
 import { again } from "./editing.js";
 import { MOST_BYTES, claim, forget, freeWorks, giveUp } from "./kept.js";
 import { keepWork, keptFiles, keptWork, ownWork, setOwnWork } from "./kept.js";
-import { openFiles } from "./sources.js";
+import { isReadable, openFiles } from "./sources.js";
 
 /**
  * @typedef {import("./kept.js").Kept} Kept
@@ -209,7 +209,8 @@ export class Keeping {
     const open = async () => {
       input(isLocal ? "here" : "there").checked = true;
       if (clip) return openClip(clip);
-      if (files.length === 0) return (await projects()).withoutVideo(project);
+      // Some browsers do not copy a file, and it may be gone since.
+      if (!files[0] || !(await isReadable(files[0]))) return (await projects()).withoutVideo(project);
       // Files that were kept have lost their folder.
       return Object.assign(await openFiles(files, imageNames), { name: project.video.name, imageNames });
     };

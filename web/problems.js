@@ -2,6 +2,12 @@
 
 import { Problem } from "./js/problem.js";
 
+/** What browsers say of a file that was chosen before differs. */
+const UNREADABLE = "The file cannot be read: it was moved, changed or removed.";
+/** Whether an error tells that.
+ * @param {unknown} error */
+export const isUnreadable = (error) => error instanceof Error && WORDS[error.name] === UNREADABLE;
+
 /** @type {Record<string, string>} */
 const WORDS = {
   unreachable: "The service cannot be reached. Is it still running?",
@@ -14,9 +20,11 @@ const WORDS = {
   "work-timeout": "The service is busy: a frame took too long. Try again in a moment.",
   "invalid-box": "This box cannot be followed. Draw a larger one inside the picture.",
   "not-ready": "The service is about to end. Try again in a moment.",
-  NotAllowedError: "The camera was refused. Allow it in the browser's address bar, or choose a video file.",
-  NotFoundError: "There is no camera. Choose a video file.",
-  NotReadableError: "The camera has stopped, or another program has it.",
+  CameraNotAllowedError: "The camera was refused. Allow it in the browser's address bar, or choose a video file.",
+  CameraNotFoundError: "There is no camera. Choose a video file.",
+  CameraNotReadableError: "The camera has stopped, or another program has it.",
+  NotReadableError: UNREADABLE,
+  NotFoundError: UNREADABLE,
   SecurityError:
     "Browsers give the camera to pages over https and from localhost only, and this page came over plain http. Open it " +
     "over https, or choose a video file.",

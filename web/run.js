@@ -6,6 +6,7 @@ import { WINDOW, followerOf } from "./follower.js";
 import { Frames, Pace, close } from "./frames.js";
 import { LocalClient } from "./js/local.js";
 import { FollowedObject } from "./objects.js";
+import { isUnreadable } from "./problems.js";
 
 /**
  * @typedef {import("./js/bagtrack.js").Box} Box
@@ -262,7 +263,7 @@ export class Run {
    * @param {unknown} failure */
   end(failure) {
     this.rest();
-    if (this.source.isFetched) this.told.rest(failure);
+    if (this.source.isFetched || isUnreadable(failure)) this.told.rest(failure);
     else this.told.fail(failure);
   }
 

@@ -3,7 +3,7 @@
 import json
 import statistics
 
-from browser import DRAW, distance, drag, drawn_frames, frames, rows, said, saved, slow, stop, to_the_end, was_said
+from browser import DRAW, distance, drag, drawn_frames, frames, kept_rows, rows, said, saved, slow, stop, to_the_end, was_said
 from clips import FRAMES, H264, SIZE, VP8, frame_numbers, run
 from service import Line, Service
 
@@ -143,6 +143,34 @@ def whole_file(checks, path, rate):
     page.context.close()
 
 
+def file_that_is_gone(checks):
+    """A file that is removed or changed while it is tracked is no fault of the camera: what was tracked is kept, also
+    over a reload, and goes on with the file."""
+    whole = checks.files.file("large.mp4", 30, (*H264, "-b:v", "30M", "-g", "20"), turned="noise=alls=20:allf=t")
+    path = checks.files.folder / "gone.mp4"
+    for spoil in (lambda: path.unlink(), lambda: path.write_bytes(whole.read_bytes() + b"more")):
+        path.write_bytes(whole.read_bytes())
+        page = checks.page(where="here", allowed=("Failed to load",))
+        choose_file(page, path)
+        drag(page, sent_box(checks.files.truth[0]))
+        frames(page, 8)
+        page.locator("#pause").click()
+        spoil()
+        page.locator("#pause").click()
+        said(page, "The file cannot be read: it was moved, changed or removed.")
+        count = len(kept_rows(page))
+        assert 8 <= count < FRAMES, count
+        page.reload()
+        said(page, f"with {count} frames. Choose gone.mp4")
+        path.write_bytes(whole.read_bytes())
+        page.locator("#file").set_input_files(path)
+        page.locator("body[data-state=paused]").wait_for()
+        page.locator("#pause").click()
+        to_the_end(page)
+        assert len(rows(page)) == FRAMES
+        page.context.close()
+
+
 def file_of_varying_rate(checks):
     """After a while three of seven frames are missing, and the frame before them stays for longer."""
     path, numbers = checks.files.varying_file()
@@ -269,6 +297,7 @@ ALL = [
     cut_file,
     cut_in_its_first_frame,
     file_of_varying_rate,
+    file_that_is_gone,
     file_of_a_phone,
     file_with_corrections,
     service_killed,
