@@ -3,7 +3,7 @@
 
 import { get, input } from "./dom.js";
 import { again } from "./editing.js";
-import { MOST_BYTES, claim, forget, freeWorks, giveUp } from "./kept.js";
+import { MOST_BYTES, claim, forget, freeWorks, giveUp, opened } from "./kept.js";
 import { keepWork, keptFiles, keptWork, ownWork, setOwnWork } from "./kept.js";
 import { isReadable, openFiles } from "./sources.js";
 
@@ -36,6 +36,8 @@ export class Keeping {
     this.id = "";
     /** @type {Source | undefined} The one whose files are kept. */
     this.source = undefined;
+    /** @type {IDBDatabase | undefined} Where they are kept. */
+    this.store = undefined;
     this.hasFiles = false;
     /** Whether all of what is here is kept. */
     this.isSafe = false;
@@ -68,7 +70,8 @@ export class Keeping {
       const { projectOf, statesOf } = await projects();
       const project = projectOf(run);
       const { isLocal, source } = run;
-      const files = this.source === source ? undefined : smallFiles(source);
+      const store = await opened();
+      const files = this.source === source && this.store === store ? undefined : smallFiles(source);
       const clip = clipOf(source);
       const { imageNames } = source;
       // In one step: a page that is left ends it, and begins no other.
@@ -78,7 +81,7 @@ export class Keeping {
       const isWhole = !!clip || hasFiles || source.isAbsent === true;
       if (run !== this.page.run) return isWhole;
       this.hasFiles = hasFiles;
-      this.source = source;
+      [this.source, this.store] = [source, store];
       this.isSafe = this.timer === undefined && isWhole;
       this.tell(`Kept in this browser: ${told(project)}.${isWhole ? "" : " The pictures are not kept."}`);
       return isWhole;

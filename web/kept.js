@@ -35,6 +35,24 @@ const PATIENCE = 1000;
 /** @type {Promise<IDBDatabase> | undefined} */
 let database;
 
+/** What runs are kept in. The browser may remove it: then it is another one.
+ * @returns {Promise<IDBDatabase>} */
+export function opened() {
+  database ??= new Promise((resolve, reject) => {
+    const request = indexedDB.open(NAME, 1);
+    request.onupgradeneeded = () => request.result.createObjectStore(STORE);
+    request.onsuccess = () => {
+      request.result.onclose = () => (database = undefined);
+      resolve(request.result);
+    };
+    request.onerror = () => {
+      database = undefined;
+      reject(request.error);
+    };
+  });
+  return database;
+}
+
 /**
  * @template T
  * @param {IDBTransactionMode} mode
@@ -42,13 +60,7 @@ let database;
  * @returns {Promise<T>}
  */
 async function within(mode, run) {
-  database ??= new Promise((resolve, reject) => {
-    const request = indexedDB.open(NAME, 1);
-    request.onupgradeneeded = () => request.result.createObjectStore(STORE);
-    request.onsuccess = () => resolve(request.result);
-    request.onerror = () => reject(request.error);
-  });
-  const transaction = (await database).transaction(STORE, mode);
+  const transaction = (await opened()).transaction(STORE, mode);
   const request = run(transaction.objectStore(STORE));
   // Without this, a page that is left at once takes back what it wrote.
   transaction.commit();

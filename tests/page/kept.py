@@ -200,6 +200,27 @@ def no_room_for_the_file(checks):
     other.context.close()
 
 
+def data_cleared_meanwhile(checks):
+    """Where the browser removes what pages keep, for want of room or as its user wants, the page keeps it anew with the
+    next change, also the file."""
+    page = checks.page(where="here")
+    choose_file(page, checks.files.file("clip.mp4", 30, H264))
+    drag(page, sent_box(checks.files.truth[0]))
+    to_the_end(page)
+    kept_rows(page)
+    browser = page.context.new_cdp_session(page)
+    browser.send("Storage.clearDataForOrigin", {"origin": checks.service.url, "storageTypes": "indexeddb"})
+    page.locator("#list input[type=text]").fill("van")
+    kept_says(page, f"Kept in this browser: clip.mp4, 1 object, {FRAMES} rows.")
+    page.wait_for_timeout(3000)
+    kept_says(page, f"Kept in this browser: clip.mp4, 1 object, {FRAMES} rows.")
+    page.reload()
+    said(page, f"clip.mp4 is here again, with {FRAMES} frames.")
+    assert "Choose" not in page.locator("#message").inner_text()
+    assert {row["name"] for row in rows(page)} == {"van"}
+    page.context.close()
+
+
 PASTED = """(input) => {
     const clipboardData = new DataTransfer();
     const canvas = document.createElement("canvas");
@@ -445,6 +466,7 @@ ALL = [
     renamed_and_reloaded,
     each_tab_for_itself,
     no_room_for_the_file,
+    data_cleared_meanwhile,
     left_for_another_source,
     project_opened_again,
     project_without_its_video,
