@@ -65,6 +65,8 @@ export class Editing {
   startDrawing() {
     const { run } = this.page;
     if (!run || run.isOver || run.isRedoing || this.page.state === "opening" || this.wantsVideo(run)) return false;
+    // The first box is on its way.
+    if (this.page.hasRows && run.count === 0) return false;
     this.page.player.stop();
     if (this.page.hasRows) run.pause(true);
     else if (run.source.isLive) {
@@ -77,10 +79,11 @@ export class Editing {
   /** A box was drawn: the first one, a correction, or that of a new object.
    * @param {Box} box */
   drawn(box) {
-    this.page.stage.draw(undefined);
     const { run } = this.page;
     if (!run) return;
+    // The first one is shown until the tracker has it.
     if (this.page.state === "first") return void this.page.follow(run, box);
+    this.page.stage.draw(undefined);
     const object = this.isAdding ? undefined : run.chosen;
     this.add(false);
     if (this.page.viewed || run.isResting) return void this.trackOn(run, object, (this.page.viewed ?? run.picture).frame, box);

@@ -176,14 +176,18 @@ export class Page {
     await this.beginning.going;
     if (own !== this.run) return;
     this.enter("following");
+    this.say("Beginning…");
     try {
       // The bar has gone on since: the box is of what was shown.
       if (picture !== own.picture) own.picture = (await own.source.goTo?.(picture.time, picture.frame)) ?? picture;
       if (this.frozen) own.picture = await this.frozen;
       await own.begin(box);
-      if (own === this.run && this.state === "following") this.say(FOLLOWING);
+      if (own !== this.run) return;
+      this.stage.draw(undefined);
+      if (this.state !== "ended") this.say(FOLLOWING);
     } catch (error) {
       if (own !== this.run) return;
+      this.stage.draw(undefined);
       this.enter("first");
       this.fail(error, () => this.follow(own, box));
     }

@@ -1,6 +1,6 @@
 """A slow line, and one that is gone before the page has all of its parts."""
 
-from browser import DRAW, said
+from browser import DRAW, choose, drag, frames, painted, said
 from clips import H264
 
 
@@ -35,4 +35,24 @@ def service_gone_before_a_choice(checks):
         page.context.close()
 
 
-ALL = [chosen_before_the_page_is_loaded, service_gone_before_a_choice]
+def drawn_before_the_tracker_is_loaded(checks):
+    """The first box stays in the picture while the tracker is on its way, which is said, and there is no second one."""
+    page = checks.page(where="here")
+    under_way = []
+    page.route("**/*_wasm_bg.wasm", lambda route: under_way.append(route))
+    choose(page, "card")
+    truth = checks.clips["card"]["truth"][0]
+    drag(page, truth)
+    said(page, "Beginning")
+    painted(page, "overlay")
+    drag(page, [20, 20, 60, 60])
+    while not under_way:
+        page.wait_for_timeout(50)
+    under_way[0].fallback()
+    said(page, "Following")
+    frames(page, 5)
+    assert page.locator("#list li").count() == 1
+    page.context.close()
+
+
+ALL = [chosen_before_the_page_is_loaded, service_gone_before_a_choice, drawn_before_the_tracker_is_loaded]
