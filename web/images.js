@@ -8,7 +8,7 @@ import { Stills } from "./stills.js";
 const FRAMES_A_SECOND = 25;
 /** Bytes within which such a comment ends. */
 const LONGEST_COMMENT = 64;
-const IMAGE = /\.(jpe?g|png|webp|bmp|gif|avif)$/i;
+const IMAGE = /\.(jpe?g|png|webp|bmp|gif|avif|hei[cf]|tiff?)$/i;
 
 /** Whether a file is an image that a browser may show.
  * @param {File} file */
@@ -40,8 +40,8 @@ async function timesIn(images) {
 
 /** Formats with animations, by the endings of names. */
 const ANIMATED = /(gif|webp|png|avif)$/i;
-/** Two of these begin frames of a GIF. */
-const GIF_FRAMES = /\x00!\xf9\x04.{4}\x00[,!].*\x00!\xf9\x04.{4}\x00[,!]/s;
+/** What files of several frames have in them: of a GIF two of what begins a frame. */
+const FRAMES = /^RIFF.{4}WEBPVP8X.*ANMF|^.PNG.*acTL|\x00!\xf9\x04.{4}\x00[,!].*\x00!\xf9\x04.{4}\x00[,!]/s;
 /** How long a frame is shown, in microseconds: as browsers do where it has no time, or up to 10 ms.
  * @param {VideoFrame | undefined} frame */
 const shownFor = (frame) => (Number(frame?.duration) > 1e4 ? Number(frame?.duration) : 1e5);
@@ -55,7 +55,7 @@ export async function openAnimated(file) {
   const data = await file.arrayBuffer();
   // Pages that came over plain http are not given it.
   if (typeof ImageDecoder === "undefined") {
-    if (GIF_FRAMES.test(new TextDecoder("latin1").decode(data))) throw new UnplayableError(file);
+    if (FRAMES.test(new TextDecoder("latin1").decode(data))) throw new UnplayableError(file);
     return undefined;
   }
   const decoder = new ImageDecoder({ data, type: `image/${format}` });
@@ -99,7 +99,7 @@ export async function openImages(files, names) {
   const picture = source.picture.bind(source);
   source.picture = async (index) => {
     const shown = await picture(index).catch(() => undefined);
-    if (!shown) throw new Error(`${images[index].name} is not an image that this browser can read.`);
+    if (!shown) throw new Error(`${images[index].name} is not an image that this browser can read. JPEG and PNG open in all.`);
     const { width, height } = shown.image;
     size ??= { width, height };
     if (width !== size.width || height !== size.height) {

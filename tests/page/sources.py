@@ -10,6 +10,7 @@ from browser import DRAW, TO_THE_END, begin_at, distance, drag, rows, said, save
 from clips import BITS, BLOCK, FRAMES, H264, MPEG4, SIZE, VP8
 from files import check_distance, check_rows, check_video, choose_file, saved_video, sent_box, times_of
 
+PHOTO = ("IMG_1.HEIC", "a", "is not an image that this browser can read. JPEG and PNG open in all.")
 COUNT = 20
 """Images of a folder."""
 BEGUN = 1.0
@@ -224,6 +225,20 @@ def frames_of_a_gif(checks):
     page.context.close()
 
 
+def animations_without_their_frames(checks):
+    """Over plain http a page is not given the frames of an animation: it is not taken for a still image."""
+    page = checks.page(where="here")
+    page.context.add_init_script("delete window.ImageDecoder;")
+    page.reload()
+    begun = checks.files.folder / "begun.webp"
+    begun.write_bytes(b"RIFF\xff\0\0\0WEBPVP8X" + bytes(14) + b"ANIM" + bytes(10) + b"ANMF" + bytes(210))
+    frames = checks.files.file("clip.apng", 25, (), "lt(n,4)", "scale=264:198")
+    for path in (frames.rename(frames.with_suffix(".png")), begun):
+        page.locator("#file").set_input_files(path)
+        said(page, f"This browser cannot play {path.name}")
+    page.context.close()
+
+
 def no_sample(checks):
     """A sample that does not come, as when the service has gone, is told in words of the page."""
     page = checks.page(where="here", allowed=("Failed to load",))
@@ -264,9 +279,9 @@ def decoding_overtaken(checks):
 
 
 def no_use_to_a_decoder(checks):
-    """An empty file and a text are refused, and the service is not offered to decode them."""
+    """An empty file, a text and a photo in a format of phones are refused, and the service is not offered to decode them."""
     page = checks.page(where="here")
-    for name, content, says in (("empty.mp4", "", "empty.mp4 is empty"), ("text.txt", "a", "neither a video nor an image")):
+    for name, content, says in (("empty.mp4", "", "empty.mp4 is empty"), ("text.txt", "a", "neither a video nor an image"), PHOTO):
         path = checks.files.folder / name
         path.write_text(content)
         page.locator("#file").set_input_files(path)
@@ -357,6 +372,7 @@ ALL = [
     begun_in_the_middle,
     decoded_by_the_service,
     frames_of_a_gif,
+    animations_without_their_frames,
     no_sample,
     no_video_at_all,
 ]
