@@ -8,6 +8,8 @@ const UNREADABLE = "The file cannot be read: it was moved, changed or removed.";
  * @param {unknown} error */
 export const isUnreadable = (error) => error instanceof Error && WORDS[error.name] === UNREADABLE;
 
+const PART = "A part of the page cannot be loaded. Is the service still running? Then load the page anew.";
+
 /** @type {Record<string, string>} */
 const WORDS = {
   unreachable: "The service cannot be reached. Is it still running?",
@@ -50,8 +52,8 @@ export class UnplayableError extends Error {
 export function words(error, hasKey) {
   if (error instanceof Problem && error.slug === "unauthorized" && !hasKey) return "This service asks for an API key.";
   if (error instanceof Problem) return WORDS[error.slug] ?? error.message;
-  // The page loads its parts when they are needed. Browsers have words of their own where one does not come.
-  if (error instanceof TypeError && /import/i.test(error.message)) return WORDS.unreachable;
+  // Browsers have words of their own for a module that does not come, and some do not ask for it again.
+  if (error instanceof TypeError && /import/i.test(error.message)) return PART;
   if (error instanceof Error) return WORDS[error.name] ?? error.message;
   return String(error);
 }

@@ -28,7 +28,7 @@ def service_gone_before_a_choice(checks):
         page = checks.page(where="here", allowed=("Failed to load",))
         page.route(f"**/page/{part}.js", lambda route: route.abort())
         choose(page)
-        said(page, "The service cannot be reached")
+        said(page, "Is the service still running? Then load the page anew.")
         page.unroute(f"**/page/{part}.js")
         choose(page)
         said(page, DRAW)
