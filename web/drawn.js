@@ -1,4 +1,4 @@
-// A box that was drawn in the last frame. It is tracked once the frames on their way are answered, before those behind it.
+// A box that was drawn in the last frame: tracked once the frames on their way are answered, before those behind it.
 
 import { Problem } from "./js/problem.js";
 

@@ -99,11 +99,11 @@ export async function openImages(files, names) {
   const picture = source.picture.bind(source);
   source.picture = async (index) => {
     const shown = await picture(index).catch(() => undefined);
-    if (!shown) throw new Error(`${images[index].name} is not an image that this browser can read. JPEG and PNG open in all.`);
+    const { name } = images[index];
+    if (!shown) throw new Error(`${name} is not an image that this browser can read. JPEG and PNG open in all.`);
     const { width, height } = shown.image;
     size ??= { width, height };
     if (width !== size.width || height !== size.height) {
-      const { name } = images[index];
       throw new Error(`${name} has ${width} x ${height} pixels, the first image ${size.width} x ${size.height}.`);
     }
     if (Math.max(width, height) <= LONGEST_SIDE) return shown;

@@ -11,7 +11,7 @@ const SPACE = "input, button, a, summary";
 
 /** A key as it is on a Latin keyboard: others have letters of their own on it.
  * @param {KeyboardEvent} event */
-const keyOf = ({ key, code }) => (key > "~" && key.length === 1 && code.startsWith("Key") ? code[3].toLowerCase() : key);
+const keyOf = ({ key, code }) => (/^[^\0-~]$/.test(key) && code.startsWith("Key") ? code[3].toLowerCase() : key);
 
 /**
  * @param {KeyboardEvent} event

@@ -3,7 +3,8 @@
 import json
 import statistics
 
-from browser import DRAW, distance, drag, drawn_frames, frames, kept_rows, rows, said, saved, slow, stop, to_the_end, was_said
+from browser import DRAW, distance, drag, drawn_frames, frames, kept_rows, rows, said, saved, slow, stop, to_the_end
+from browser import was_said
 from clips import FRAMES, H264, SIZE, VP8, frame_numbers, run
 from service import Line, Service
 

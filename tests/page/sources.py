@@ -10,6 +10,8 @@ from browser import DRAW, TO_THE_END, begin_at, distance, drag, rows, said, save
 from clips import BITS, BLOCK, FRAMES, H264, MPEG4, SIZE, VP8
 from files import check_distance, check_rows, check_video, choose_file, saved_video, sent_box, times_of
 
+EMPTY = ("empty.mp4", "", "empty.mp4 is empty")
+TEXT = ("text.txt", "a", "neither a video nor an image")
 PHOTO = ("IMG_1.HEIC", "a", "is not an image that this browser can read. JPEG and PNG open in all.")
 COUNT = 20
 """Images of a folder."""
@@ -279,9 +281,9 @@ def decoding_overtaken(checks):
 
 
 def no_use_to_a_decoder(checks):
-    """An empty file, a text and a photo in a format of phones are refused, and the service is not offered to decode them."""
+    """An empty file, a text and a photo of a phone are refused, and the service is not offered to decode them."""
     page = checks.page(where="here")
-    for name, content, says in (("empty.mp4", "", "empty.mp4 is empty"), ("text.txt", "a", "neither a video nor an image"), PHOTO):
+    for name, content, says in (EMPTY, TEXT, PHOTO):
         path = checks.files.folder / name
         path.write_text(content)
         page.locator("#file").set_input_files(path)
