@@ -58,10 +58,8 @@ pub fn area_average_simd<S: Simd>(
     let averages = &mut out[first..];
     let (width, columns) = (source.0 as usize, target.0 as usize);
     let factor = source.0 / target.0;
-    match factor {
-        _ if source != (factor * target.0, factor * target.1) => {
-            any_sizes(luma, source, target, averages)
-        }
+    let is_whole = source == (factor * target.0, factor * target.1);
+    match factor * u32::from(is_whole) {
         2 => square_means::<2>(luma, width, 0..columns, averages),
         3 => square_means::<3>(luma, width, 0..columns, averages),
         4 => square_means::<4>(luma, width, 0..columns, averages),
