@@ -109,7 +109,7 @@ export async function openCamera(place) {
   if (!navigator.mediaDevices) throw new DOMException("", "CameraNotFoundError");
   const wanted = { width: { ideal: 640 }, height: { ideal: 480 }, facingMode: "environment" };
   const stream = await navigator.mediaDevices.getUserMedia({ video: wanted }).catch(({ name, message }) => {
-    throw new DOMException(message, `Camera${name}`);
+    throw new DOMException(message, /^Not/.test(name) ? `Camera${name}` : name);
   });
   const video = addVideo(place);
   const ready = loaded(video);

@@ -100,7 +100,12 @@ export async function openImages(files, names) {
   source.picture = async (index) => {
     const shown = await picture(index).catch(() => undefined);
     const { name } = images[index];
-    if (!shown) throw new Error(`${name} is not an image that this browser can read. JPEG and PNG open in all.`);
+    if (!shown) {
+      // Fails where the file is gone.
+      await images[index].slice(0, 1).arrayBuffer();
+      const hint = /\.(jpe?g|png)$/i.test(name) ? "" : " JPEG and PNG open in all.";
+      throw new Error(`${name} is not an image that this browser can read.${hint}`);
+    }
     const { width, height } = shown.image;
     size ??= { width, height };
     if (width !== size.width || height !== size.height) {

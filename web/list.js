@@ -45,7 +45,8 @@ export class ObjectList {
    * @param {HTMLElement} item */
   remove(object, item) {
     const beside = item.nextElementSibling ?? item.previousElementSibling;
-    const hadFocus = item.contains(document.activeElement);
+    // Not where a mouse has clicked: then keys are the page's.
+    const hadFocus = item.querySelector(":focus-visible");
     item.remove();
     this.items.delete(object);
     if (hadFocus) /** @type {HTMLElement | null} */ (beside?.lastElementChild)?.focus();

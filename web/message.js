@@ -2,6 +2,7 @@
 
 /** A status that held for fewer frames is not said. */
 const SAID_AFTER = 5;
+export const BEGINNING = "Beginning…";
 export const GO_ON = ' Press "Go on" to try again from there.';
 export const FOLLOWING = "Following. Draw again to correct the box.";
 

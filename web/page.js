@@ -6,7 +6,7 @@ import { button, canvas, get } from "./dom.js";
 import { Editing } from "./editing.js";
 import { LocalClient } from "./js/local.js";
 import { Problem } from "./js/problem.js";
-import { FOLLOWING, GO_ON, Message } from "./message.js";
+import { BEGINNING, FOLLOWING, GO_ON, Message } from "./message.js";
 import { Opening } from "./opening.js";
 import { Player } from "./player.js";
 import { words } from "./problems.js";
@@ -174,9 +174,11 @@ export class Page {
     this.message.follow();
     const { picture } = own;
     await this.beginning.going;
-    if (own !== this.run) return;
+    const { state } = this;
+    // Another box may have been drawn meanwhile.
+    if (own !== this.run || state !== "first") return;
     this.enter("following");
-    this.say("Beginning…");
+    this.say(BEGINNING);
     try {
       // The bar has gone on since: the box is of what was shown.
       if (picture !== own.picture) own.picture = (await own.source.goTo?.(picture.time, picture.frame)) ?? picture;

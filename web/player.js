@@ -3,7 +3,7 @@
 import { button } from "./dom.js";
 import { DRAW, TAP } from "./editing.js";
 import { close } from "./frames.js";
-import { FOLLOWING, GO_ON } from "./message.js";
+import { BEGINNING, FOLLOWING, GO_ON } from "./message.js";
 
 export class Player {
   /** @param {import("./page.js").Page} page */
@@ -36,7 +36,7 @@ export class Player {
     const { page } = this;
     const { run, state } = page;
     if (!run || run.isRedoing || run.isOver) return;
-    if (run.wantsObject) return page.say(`There is no object. ${TAP}${DRAW}`);
+    if (run.wantsObject) return page.say(run.count > 0 ? `There is no object. ${TAP}${DRAW}` : BEGINNING);
     const isStopped = run.wake && state === "ended";
     page.enter("following");
     if (isStopped) page.say(FOLLOWING);

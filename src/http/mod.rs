@@ -1,4 +1,4 @@
-//! The HTTP interface: one file for each resource, and the layers that every request passes through.
+//! The HTTP interface: one file for each resource, and the middleware that every request passes through.
 //!
 //! In: connections. Out: JSON answers, or problem documents (RFC 9457). A request goes through the layers of the
 //! router, into an extractor that reads its upload, into its handler, which works on a session with a worker thread,

@@ -53,6 +53,10 @@ def objects_by_keyboard(checks):
     stored = json.loads(saved(page, "#save-project"))["objects"]
     assert sorted(found["name"] for found in stored) == ["bus", "cat!?", "van"], stored
     checks.no_axe_violations(page, "objects")
+    # After a click Space is the page's, and deletes no other one.
+    page.locator("#list button.remove").first.click()
+    page.keyboard.press("Space")
+    assert page.locator("#list li").count() == 2
     page.context.close()
 
 

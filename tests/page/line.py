@@ -20,17 +20,21 @@ def chosen_before_the_page_is_loaded(checks):
 
 def service_gone_before_a_choice(checks):
     """Where the service has gone since the page was loaded, a choice says so, and works once it is back."""
-    for part, choose in (
-        ("project", lambda page: page.locator("#file").set_input_files(checks.files.file("clip.mp4", 30, H264))),
-        ("run", lambda page: page.locator("#file").set_input_files(checks.files.file("clip.mp4", 30, H264))),
+
+    def choose_clip(page):
+        page.locator("#file").set_input_files(checks.files.file("clip.mp4", 30, H264))
+
+    for part, act in (
+        ("project", choose_clip),
+        ("run", choose_clip),
         ("clip", lambda page: page.locator("#card").click()),
     ):
         page = checks.page(where="here", allowed=("Failed to load",))
         page.route(f"**/page/{part}.js", lambda route: route.abort())
-        choose(page)
+        act(page)
         said(page, "Is the service still running? Then load the page anew.")
         page.unroute(f"**/page/{part}.js")
-        choose(page)
+        act(page)
         said(page, DRAW)
         page.context.close()
 

@@ -84,7 +84,7 @@ impl Caller {
     }
 }
 
-/// The client of a request that has passed [the layer that notes it](crate::http::middleware::client_identity).
+/// The client of a request that has passed [the middleware that notes it](crate::http::middleware::client_identity).
 pub fn client_of(parts: &Parts) -> Client {
     let client = parts.extensions.get::<Client>().cloned();
     client.unwrap_or_else(|| Client::at(Ipv4Addr::UNSPECIFIED.into()))
@@ -94,8 +94,8 @@ impl<S: Send + Sync> FromRequestParts<S> for Caller {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, _state: &S) -> Result<Self, Problem> {
-        // A route without the layer serves nobody.
-        let missing = || io::Error::other("the route is not behind the layer that authenticates");
+        // A route without the middleware serves nobody.
+        let missing = || io::Error::other("no middleware has identified the caller");
         let caller = parts.extensions.get::<Self>().cloned();
         caller.ok_or_else(|| Problem::internal(Arc::new(missing())))
     }

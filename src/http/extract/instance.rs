@@ -17,11 +17,11 @@ use std::convert::Infallible;
 pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 const MAX_ID_BYTES: usize = 64;
 
-/// The path of a request with the base path, where a layer has taken that off.
+/// The path of a request with the base path, where a middleware has taken that off.
 #[derive(Debug, Clone)]
 pub struct ClientPath(pub String);
 
-/// The path and the id of a request that has passed the layers.
+/// The path and the id of a request that has passed the middleware.
 #[derive(Debug, Clone)]
 pub struct Instance {
     /// The path, as the client knows it.

@@ -1,4 +1,4 @@
-//! Writes the document of a problem that a handler or a layer answered with, and its line in the log.
+//! Writes the document of a problem that a handler or a middleware answered with, and its line in the log.
 
 use crate::http::extract::instance::Instance;
 use crate::http::problems::problem::Problem;

@@ -8,7 +8,7 @@ use std::error::Error;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What a refused request left as it was: the last sentence of the detail.
+/// What a refused request did: the last sentence of the detail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effect {
     NothingChanged,
@@ -23,7 +23,7 @@ impl Effect {
         match self {
             Self::NothingChanged => "Nothing was changed.",
             Self::SessionUnchanged => "The session is unchanged.",
-            Self::NoFrameTracked => "None of them was tracked.",
+            Self::NoFrameTracked => "No frame of this request was tracked.",
             Self::LinesCount => "The lines before this one count.",
         }
     }
@@ -316,7 +316,7 @@ fixed! {
 }
 
 impl IntoResponse for Problem {
-    /// The status alone: an outer layer writes the document, since it knows the request.
+    /// The status alone: a middleware writes the document, since it knows the request.
     fn into_response(self) -> Response {
         let mut response = self.status().into_response();
         response.extensions_mut().insert(self);

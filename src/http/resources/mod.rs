@@ -1,6 +1,6 @@
 //! The resources of the interface, a file each: extract the request, do one act, respond.
 //!
-//! In: requests that passed the layers. Out: responses or problems, by the types in `extract`, `respond` and
+//! In: requests that passed the middleware. Out: responses or problems, by the types in `extract`, `respond` and
 //! `problems`.
 
 pub mod bag_picture;

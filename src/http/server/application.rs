@@ -147,7 +147,7 @@ impl Application {
         Some(move || verifier.reload(state.now()))
     }
 
-    /// Serves these routes too: behind the layers that all requests pass, but not behind those that ask for a key, or
+    /// Serves these routes too: behind the middleware that all requests pass, but not behind those that ask for a key, or
     /// check the origin and the host.
     pub fn with_routes(mut self, routes: Router) -> Self {
         self.extra = self.extra.merge(routes);

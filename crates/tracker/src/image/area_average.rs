@@ -12,8 +12,8 @@ use pulp::{Arch, Simd};
 /// Added to a number below 2^51, it leaves the nearest whole number in the last bits.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 
-/// Target rows that are averaged together: they fill a vector register, while which columns a target pixel covers
-/// changes from one to the next.
+/// Target rows that are averaged together: they fill a vector register of SSE or WebAssembly, while which columns a
+/// target pixel covers changes from one to the next. Twice as many were slower.
 const ROWS: usize = 4;
 
 /// The source pixels of one target pixel: `begin..end` wholly, the one before and the one after in part, in units of
@@ -59,6 +59,7 @@ pub fn area_average_simd<S: Simd>(
     let (width, columns) = (source.0 as usize, target.0 as usize);
     let factor = source.0 / target.0;
     let is_whole = source == (factor * target.0, factor * target.1);
+    // 0 is no whole factor: the way for any sizes is compiled once.
     match factor * u32::from(is_whole) {
         2 => square_means::<2>(luma, width, 0..columns, averages),
         3 => square_means::<3>(luma, width, 0..columns, averages),
@@ -105,22 +106,22 @@ fn any_sizes(luma: &[u8], source: (u32, u32), target: (u32, u32), out: &mut [u8]
     }
 }
 
-/// [`area_average`], where `T` holds the sum of a target pixel: 255 times the source's pixels. Sums over more columns
-/// may wrap around, and their difference is right all the same.
+/// [`area_average`], where `Sum` holds that of a target pixel: up to 255 times the source's pixels. Sums over more
+/// columns may wrap around, and their difference is right all the same.
 #[inline(always)]
-fn average<T>(luma: &[u8], source: (u32, u32), target: (u32, u32), out: &mut [u8])
+fn average<Sum>(luma: &[u8], source: (u32, u32), target: (u32, u32), out: &mut [u8])
 where
-    T: WrappingAdd + WrappingMul + WrappingSub + Default + AsPrimitive<f64>,
-    u32: AsPrimitive<T>,
+    Sum: WrappingAdd + WrappingMul + WrappingSub + Default + AsPrimitive<f64>,
+    u32: AsPrimitive<Sum>,
 {
     let (width, columns) = (source.0 as usize, target.0 as usize);
     let boundaries = boundaries(source.0, target.0);
-    let unit: T = target.0.as_();
+    let unit: Sum = target.0.as_();
     let divisor = Divisor::new(u64::from(source.0) * u64::from(source.1));
     let mut sums: [Vec<u32>; ROWS] = std::array::from_fn(|_| vec![0; width]);
     // The last target pixel ends at the last column's end, and of what follows it takes nothing.
-    let mut integral = vec![[T::default(); ROWS]; width + 2];
-    let mut totals = vec![[T::default(); ROWS]; columns];
+    let mut integral = vec![[Sum::default(); ROWS]; width + 2];
+    let mut totals = vec![[Sum::default(); ROWS]; columns];
     let mut averages = vec![[0_u8; ROWS]; columns];
     let cells = cells(source.1, target.1);
     for (cells, out) in cells.chunks(ROWS).zip(out.chunks_mut(ROWS * columns)) {
@@ -129,10 +130,10 @@ where
             sum_rows(luma, cell, target.1, sums);
         }
         integrate(&sums, &mut integral);
-        let mut begin = [T::default(); ROWS];
+        let mut begin = [Sum::default(); ROWS];
         for (total, &(boundary, part)) in totals.iter_mut().zip(&boundaries[1..]) {
             let [before, after] = &integral[boundary as usize..].as_chunks::<2>().0[0];
-            let (part, mut end): (T, _) = (part.as_(), [T::default(); ROWS]);
+            let (part, mut end): (Sum, _) = (part.as_(), [Sum::default(); ROWS]);
             for row in 0..ROWS {
                 // In units of `1 / T`.
                 let within = after[row].wrapping_sub(&before[row]).wrapping_mul(&part);
@@ -178,12 +179,12 @@ fn sum_rows(luma: &[u8], cell: &Cell, height: u32, sums: &mut [u32]) {
 
 /// Sets each of `integral` but the first to the sums over the columns before it.
 #[inline(always)]
-fn integrate<T>(sums: &[Vec<u32>; ROWS], integral: &mut [[T; ROWS]])
+fn integrate<Sum>(sums: &[Vec<u32>; ROWS], integral: &mut [[Sum; ROWS]])
 where
-    T: WrappingAdd + Default + Copy + 'static,
-    u32: AsPrimitive<T>,
+    Sum: WrappingAdd + Default + Copy + 'static,
+    u32: AsPrimitive<Sum>,
 {
-    let mut total = [T::default(); ROWS];
+    let mut total = [Sum::default(); ROWS];
     let width = sums[0].len();
     let sums = sums.each_ref().map(|sums| &sums[..width]);
     for (column, integral) in integral[1..=width].iter_mut().enumerate() {

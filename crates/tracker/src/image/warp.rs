@@ -54,7 +54,7 @@ impl Rotation {
         })
     }
 
-    /// Like [`Self::apply`], for who looks at nothing further out: any pixels may be there.
+    /// Like [`Self::apply`], for callers that read nothing further out: what is there is not defined.
     pub fn apply_within(&self, frame: &Frame, window: &Rect, scratch: Frame) -> Frame {
         frame.map_planes(scratch, |plane, mut pixels| {
             pixels.resize(plane.pixels.len(), 0);
