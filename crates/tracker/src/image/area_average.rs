@@ -59,12 +59,11 @@ pub fn area_average_simd<S: Simd>(
     let (width, columns) = (source.0 as usize, target.0 as usize);
     let factor = source.0 / target.0;
     let is_whole = source == (factor * target.0, factor * target.1);
-    // 0 is no whole factor: the way for any sizes is compiled once.
-    match factor * u32::from(is_whole) {
-        2 => square_means::<2>(luma, width, 0..columns, averages),
-        3 => square_means::<3>(luma, width, 0..columns, averages),
-        4 => square_means::<4>(luma, width, 0..columns, averages),
-        6 => square_means::<6>(luma, width, 0..columns, averages),
+    match (is_whole, factor) {
+        (true, 2) => square_means::<2>(luma, width, 0..columns, averages),
+        (true, 3) => square_means::<3>(luma, width, 0..columns, averages),
+        (true, 4) => square_means::<4>(luma, width, 0..columns, averages),
+        (true, 6) => square_means::<6>(luma, width, 0..columns, averages),
         _ => any_sizes(luma, source, target, averages),
     }
 }
