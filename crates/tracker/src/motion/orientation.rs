@@ -5,7 +5,7 @@
 //!
 //! The angle is measured in frames that the models are updated from: the answer is compared once more in images rotated
 //! a step further either way, and weighed as particles are. The bag's first subspace does not rotate along, so the
-//! angle does not drift with what was learned.
+//! angle does not drift with what was learned. While the target stands upright it is measured in every second frame.
 
 use std::f64::consts::PI;
 
@@ -29,6 +29,8 @@ const SIGMA_FACTOR: f64 = 3.0;
 const PRIOR_STD: f64 = 25.0;
 /// Below this angle, in degrees, the image is not rotated: the features hardly change.
 const MIN_ANGLE: f64 = 8.0;
+/// Below this angle, in degrees, a target stands upright: one measurement alone turns it by less.
+const UPRIGHT: f64 = 4.0;
 /// An angle is measured only where the distance to the first subspace is below this: a target half covered is nearer to
 /// it at some angle by chance.
 const MAX_DISTANCE: f64 = 0.25;
@@ -57,7 +59,10 @@ impl State {
         found: &Localization,
         scratch: &mut Scratch,
     ) -> f64 {
-        if !is_on(&self.params) || found.first_distance >= MAX_DISTANCE {
+        if !is_on(&self.params)
+            || found.first_distance >= MAX_DISTANCE
+            || self.rests_upright(found.number)
+        {
             return self.orientation;
         }
         let step = STEP.to_radians();
@@ -72,5 +77,10 @@ impl State {
         let change = (weights[1] - weights[0]) * step;
         // Half a turn is as far as there is.
         (self.orientation + GAIN * change).clamp(-PI, PI)
+    }
+
+    /// Whether frame `number` is one of those in which the angle of an upright target is not measured.
+    fn rests_upright(&self, number: u64) -> bool {
+        self.orientation.abs() < UPRIGHT.to_radians() && !number.is_multiple_of(2)
     }
 }
