@@ -55,10 +55,7 @@ export class Camera {
     return { image, blob: await encoded(image), time: 0, frame: 0 };
   }
 
-  /**
-   * @param {(picture: Picture) => void} deliver
-   * @returns {Promise<void>}
-   */
+  /** @type {Source["start"]} */
   start(deliver) {
     const { video } = this;
     let isBusy = false;

@@ -15,22 +15,11 @@ export class FrameNumbers {
     const samples = Array.from(times.keys()).filter((sample) => shown[sample]);
     this.samples = samples.sort((one, other) => times[one] - times[other]);
     this.numbers = new Map(this.samples.map((sample, number) => [times[sample], number]));
-    /** The samples that need no other ones, ascending. */
-    this.keys = Array.from(keys.keys()).filter((sample) => keys[sample]);
+    let key = keys.indexOf(1);
+    /** For each sample the one that decoding begins with: it needs no other ones. */
+    this.keyOf = Array.from(keys, (isKey, sample) => (key = isKey ? sample : key));
     /** In seconds. */
     this.times = this.samples.map((sample) => times[sample] / 1e6);
-  }
-
-  /** The sample that decoding begins with, for this one.
-   * @param {number} sample */
-  keyOf(sample) {
-    let [low, high] = [0, this.keys.length];
-    while (high - low > 1) {
-      const middle = (low + high) >> 1;
-      if (this.keys[middle] <= sample) low = middle;
-      else high = middle;
-    }
-    return this.keys[low];
   }
 }
 
@@ -75,7 +64,7 @@ export class FrameDecoder {
   /** @param {number} number */
   async decode(number) {
     const sample = this.frames.samples[number];
-    const key = this.frames.keyOf(sample);
+    const key = this.frames.keyOf[sample];
     this.wanted = number;
     this.drop(number);
     const isAhead = this.decoder?.state === "configured" && number > this.last && key <= this.next;

@@ -2,7 +2,7 @@
 
 import { catchUp } from "./again.js";
 import { scaled } from "./boxes.js";
-import { Problem } from "./js/problem.js";
+import { refusedState } from "./objects.js";
 
 /**
  * @typedef {import("./run.js").Run} Run
@@ -39,13 +39,7 @@ async function restored(run, object, client) {
   const state = await save()
     .catch(() => opened().then(save))
     .catch(() => undefined);
-  if (!state) return undefined;
-  try {
-    return await client.restore(state);
-  } catch (problem) {
-    if (problem instanceof Problem && problem.slug === "invalid-snapshot") return undefined;
-    throw problem;
-  }
+  return state && client.restore(state).catch(refusedState);
 }
 
 /**

@@ -17,23 +17,16 @@ export const isImage = (file) => file.type.startsWith("image/") || IMAGE.test(fi
 /** @param {File} file */
 const pathOf = (file) => file.webkitRelativePath || file.name;
 
-/** The time in a JPEG file that the service made of a frame of a video: in its first comment.
- * @param {File} file */
-async function timeIn(file) {
-  // A byte that is no text is read as one character.
-  const head = await file.slice(0, LONGEST_COMMENT).text();
-  const time = /^.{6}time=(-?[\d.]+)/s.exec(head)?.[1];
-  return time === undefined ? undefined : Number(time);
-}
-
-/** The times of such files; nothing where they are other images.
+/** The times in JPEG files that the service made of frames of a video: in their first comments. Nothing for other images.
  * @param {File[]} images */
 async function timesIn(images) {
   const times = [];
   for (const image of images) {
-    const time = await timeIn(image);
-    if (time === undefined) return undefined;
-    times.push(time);
+    // A byte that is no text is read as one character.
+    const head = await image.slice(0, LONGEST_COMMENT).text();
+    const time = /^.{6}time=(-?[\d.]+)/s.exec(head);
+    if (!time) return undefined;
+    times.push(Number(time[1]));
   }
   return times;
 }

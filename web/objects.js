@@ -29,7 +29,7 @@ const COLORS = [
 /** A service that was started again with other keys takes no states of before. What else fails is a failure.
  * @param {unknown} error
  * @returns {undefined} */
-function refusedState(error) {
+export function refusedState(error) {
   if (!(error instanceof Problem && error.slug === "invalid-snapshot")) throw error;
 }
 

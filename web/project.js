@@ -130,11 +130,11 @@ async function projectIn(files) {
  * @param {import("./source.js").Source} source
  * @param {Project} project */
 function unlike({ name, size, count = Infinity }, { video, objects }) {
-  const pixels = `${name} has ${size.width} × ${size.height} pixels`;
   // More rows than a call takes arguments.
   const last = objects.flatMap(({ rows }) => rows).reduce((last, [frame]) => Math.max(last, frame), 0);
   if (size.width !== video.width || size.height !== video.height) {
-    return `${pixels}, the video of this project (${video.name}) ${video.width} × ${video.height}: it is another one.`;
+    const other = `the video of this project (${video.name}) ${video.width} × ${video.height}`;
+    return `${name} has ${size.width} × ${size.height} pixels, ${other}: it is another one.`;
   }
   if (last < count) return "";
   return `${name} has ${count} frames, and this project (${video.name}) a box in frame ${last}: it is another video.`;
@@ -190,18 +190,9 @@ async function openProject(keeping, file, files) {
   let project;
   // Reads it as a source is opened: a choice that overtakes it says what is said.
   const open = async () => {
-    project = readProject(parsed(await file.text(), file.name));
+    const read = new Response(await file.text()).json();
+    project = readProject(await read.catch(() => Promise.reject(new Error(`${file.name} is no JSON.`))));
     return files.length > 0 ? fitting(await openFiles(files), project) : withoutVideo(project);
   };
   await keeping.page.opening.choose(open, (run) => keeping.resume(run, project, {}));
-}
-
-/** @param {string} text
- * @param {string} name */
-function parsed(text, name) {
-  try {
-    return JSON.parse(text);
-  } catch {
-    throw new Error(`${name} is no JSON.`);
-  }
 }

@@ -15,7 +15,7 @@ export class Stills {
    * @param {number} rate Frames a second.
    * @param {(index: number) => Promise<Blob>} [load] For frames that are files of their own.
    */
-  constructor(name, rate, load = () => Promise.reject(new Error("There is no such file."))) {
+  constructor(name, rate, load = async () => new Blob()) {
     this.name = name;
     this.isLive = false;
     this.size = { width: 0, height: 0 };
@@ -94,10 +94,7 @@ export class Stills {
     return loading;
   }
 
-  /**
-   * @param {(picture: Picture) => void} deliver
-   * @param {() => void} end
-   */
+  /** @type {Source["start"]} */
   async start(deliver, end) {
     let due = performance.now();
     for (let index = this.index + 1; index < this.count && !this.isStopped; index += 1) {

@@ -42,20 +42,17 @@ async function indexOf(file) {
  * @returns {Promise<Source>}
  */
 export async function openVideo(file, place) {
-  const [index, played] = await Promise.allSettled([indexOf(file), openPlayed(file, place)]);
-  const player = played.status === "fulfilled" ? played.value : undefined;
-  if (index.status === "fulfilled" && index.value) {
-    try {
-      // What an element plays has the shape of its pixels and is turned as it should be.
-      const source = await decodedFile(file, index.value, player?.size);
-      player?.close();
-      return source;
-    } catch (error) {
-      if (!player) throw error;
-    }
+  const opening = openPlayed(file, place);
+  const [index, player] = await Promise.all([indexOf(file), opening.catch(() => undefined)]);
+  try {
+    // What an element plays has the shape of its pixels and is turned as it should be.
+    const source = index && (await decodedFile(file, index, player?.size));
+    if (source) player?.close();
+    return source ?? opening;
+  } catch (error) {
+    if (!player) throw error;
+    return player;
   }
-  if (played.status === "rejected") throw played.reason;
-  return played.value;
 }
 
 /**
@@ -68,7 +65,7 @@ async function decodedFile(file, index, size) {
   const frames = new FrameNumbers(index);
   const { times } = frames;
   const mean = (times.length - 1) / (times[times.length - 1] - times[0]);
-  const source = new Stills(file.name, times.length > 1 ? mean : 25);
+  const source = new Stills(file.name, mean || 25);
   // What is looked at while the file goes on does not hold it up.
   const [decoder, viewer] = [0, 1].map(() => new FrameDecoder(file, index, frames));
   const pictureOf = async (/** @type {FrameDecoder} */ from, /** @type {number} */ number) => {
