@@ -6,8 +6,9 @@
 
 import { Delivery } from "./delivery.js";
 import { BEFORE, Gaps, SAME_PASSES } from "./gaps.js";
-import { Playback, SAME, areEqual, isEmpty, learnRate } from "./playback.js";
+import { Playback, SAME, UNREADABLE, areEqual, isEmpty, learnRate } from "./playback.js";
 import { addVideo, drawFrame, encoded, loaded } from "./source.js";
+import { isReadable } from "./sources.js";
 
 /**
  * @typedef {import("./source.js").Picture} Picture
@@ -23,6 +24,12 @@ const SPEEDS_UP_AFTER = 40;
 const LONGEST_TAIL = 1;
 /** Pictures of the screen after which a frame is shown that was told of. */
 const SETTLES_AFTER = 3;
+
+/** @param {HTMLCanvasElement} image
+ * @param {number} frame
+ * @param {number} time
+ * @returns {Promise<Picture>} */
+const pictureOf = async (image, frame, time) => ({ image, blob: await encoded(image), time, frame });
 
 /** @implements {Source} */
 export class VideoFile {
@@ -50,7 +57,7 @@ export class VideoFile {
     this.skipped = 0;
     this.isHeld = false;
     this.isStopped = false;
-    this.playback = new Playback(video);
+    this.playback = new Playback(video, file);
     this.hasEnded = false;
     /** @type {number | undefined} The time of a frame that is taken in a moment; infinite when it has gone by. */
     this.settling = undefined;
@@ -67,8 +74,6 @@ export class VideoFile {
     this.gaps = new Gaps(this);
     this.sinceGap = 0;
     this.end = () => {};
-    /** @type {(error: unknown) => void} */
-    this.fail = () => undefined;
     this.adjust = this.adjust.bind(this);
     this.delivery = new Delivery(this.adjust);
   }
@@ -95,7 +100,7 @@ export class VideoFile {
     this.learned ??= await learnRate(this.video);
     // The times of rows are rounded, perhaps to before the frame.
     const sought = frame === undefined ? time : time + BEFORE;
-    const shown = await this.playback.seek(Math.min(sought, this.duration));
+    const shown = await this.playback.reach(Math.min(sought, this.duration));
     const shownTime = shown?.mediaTime ?? time;
     return this.begin(frame ?? Math.round((shownTime - this.firstTime) * this.learned), shownTime, shown);
   }
@@ -105,11 +110,10 @@ export class VideoFile {
    * @param {number} time
    * @param {VideoFrameCallbackMetadata | undefined} shown
    * @returns {Promise<Picture>} */
-  async begin(frame, time, shown) {
+  begin(frame, time, shown) {
     this.last = { frame, time, shown: shown?.presentedFrames };
-    const image = drawFrame(this.video);
-    this.lastImage = image;
-    return { image, blob: await encoded(image), time, frame };
+    this.lastImage = drawFrame(this.video);
+    return pictureOf(this.lastImage, frame, time);
   }
 
   /** Any frame, by an element of its own: the file plays on meanwhile.
@@ -119,22 +123,18 @@ export class VideoFile {
   at(frame, time) {
     const looked = this.looked.then(async () => {
       this.reader ??= await openPlayed(this.file, this.place);
-      await this.reader.playback.seek(time + BEFORE);
-      const image = drawFrame(this.reader.video);
-      return { image, blob: await encoded(image), time, frame };
+      await this.reader.playback.reach(time + BEFORE);
+      return pictureOf(drawFrame(this.reader.video), frame, time);
     });
     this.looked = looked.catch(() => undefined);
     return looked;
   }
 
-  /**
-   * @param {(picture: Picture) => void} deliver
-   * @param {() => void} end
-   * @returns {Promise<void>}
-   */
+  /** @type {Source["start"]} */
   start(deliver, end) {
     const { video } = this;
     this.delivery.deliver = deliver;
+    this.delivery.fail = this.playback.fail;
     this.end = end;
     const next = (/** @type {number} */ _, /** @type {VideoFrameCallbackMetadata} */ shown) => {
       if (this.isStopped) return;
@@ -146,11 +146,8 @@ export class VideoFile {
     // In a hidden page frames are not told of.
     document.addEventListener("visibilitychange", this.adjust);
     video.playbackRate = CAUTIOUS;
-    return new Promise((_, reject) => {
-      this.fail = this.delivery.fail = reject;
-      video.onerror = () => reject(new DOMException("", "EncodingError"));
-      this.adjust();
-    });
+    this.adjust();
+    return this.playback.broken;
   }
 
   /** Takes the frame that is shown, if it is the next one.
@@ -225,11 +222,11 @@ export class VideoFile {
   adjust() {
     const { video } = this;
     const isBusy = this.playback.isSeeking || this.settling !== undefined;
-    const isWanted = !this.isStopped && !isBusy && !this.hasEnded && !video.ended;
-    if (isWanted && !this.isHeld && !document.hidden && !this.delivery.isFull) {
+    const isAtEnd = this.isStopped || this.hasEnded || video.ended;
+    if (!isAtEnd && !isBusy && !this.isHeld && !document.hidden && !this.delivery.isFull) {
       if (!video.paused) return;
       // It may be paused again before it plays.
-      video.play().catch((error) => error.name === "AbortError" || this.fail(error));
+      video.play().catch((error) => error.name === "AbortError" || this.playback.fail(error));
     } else if (!video.paused) {
       video.pause();
     } else if (video.ended && !isBusy) {
@@ -244,12 +241,10 @@ export class VideoFile {
     for (let count = 0; count < 2; count += 1) await new Promise((resolve) => setTimeout(resolve, 50));
     while (this.settling !== undefined) await new Promise(requestAnimationFrame);
     if (this.playback.isSeeking || this.isStopped || this.hasEnded || !this.video.ended) return;
-    const { duration } = this.video;
-    const { time } = this.last;
+    const [{ duration }, { time }] = [this.video, this.last];
     const tail = Number.isFinite(duration) ? duration - time : 0;
-    const isSuspect = tail < LONGEST_TAIL && this.gaps.mayPassOver(time, duration, 1);
     // There the file ends again, or plays on.
-    if (isSuspect) return this.gaps.lookInto(duration, 1);
+    if (tail < LONGEST_TAIL && this.gaps.mayPassOver(time, duration, 1)) return this.gaps.lookInto(duration, 1);
     this.hasEnded = true;
     await this.delivery.end();
     if (!this.isStopped) this.end();
@@ -291,7 +286,7 @@ export async function openPlayed(file, place) {
     if (video.videoWidth === 0) throw new DOMException("", "NotSupportedError");
   } catch (error) {
     video.remove();
-    throw error;
+    throw (await isReadable(file)) ? error : UNREADABLE;
   }
   return new VideoFile(video, file, place);
 }

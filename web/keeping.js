@@ -78,7 +78,7 @@ export class Keeping {
       const work = { id, at: Date.now(), isLocal, project, states: statesOf(run), clip, imageNames };
       const hasRoom = await keepWork(work, files);
       const hasFiles = files ? hasRoom && files.length > 0 : this.hasFiles;
-      const isWhole = !!clip || hasFiles || source.isAbsent === true;
+      const isWhole = !!clip || hasFiles || source.isAbsent === true || run.isGone;
       if (run !== this.page.run) return isWhole;
       this.hasFiles = hasFiles;
       [this.source, this.store] = [source, store];
@@ -289,6 +289,7 @@ async function wake(run, open) {
     // It can be tried again; where the run has failed meanwhile, with the source opened anew.
     run.wake ??= own;
     run.isResting = true;
+    run.failure = error;
     run.leaveSessions();
     throw error;
   }

@@ -74,7 +74,8 @@ export class Page {
 
   /** Whether frames after the last one can be tracked, though it was stopped. */
   get canGoOn() {
-    return this.run?.wake !== undefined && this.run.source.goTo !== undefined;
+    const { run } = this;
+    return run?.wake !== undefined && run.source.goTo !== undefined && !run.isGone;
   }
 
   /** The frame that is shown.
@@ -132,8 +133,9 @@ export class Page {
     this.enter("ended");
     this.repaint();
     this.changed();
+    const { isGone, source } = this.run ?? {};
     if (this.canGoOn) this.fail(error, () => this.player.goOn(), GO_ON);
-    else this.fail(error, undefined, " Choose the video or the camera again.");
+    else this.fail(error, undefined, ` Choose ${isGone ? source?.name : "the video or the camera"} again.`);
   }
 
   reset() {

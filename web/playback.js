@@ -1,15 +1,39 @@
 // A video element that is gone to a time with, and what it shows then.
 
+import { isReadable } from "./sources.js";
+
 /** Media times that differ by less are the same frame's, in seconds. */
 export const SAME = 0.001;
 /** How long a browser may take to show a frame that it went to, in milliseconds. */
 const SHOWN_WITHIN = 500;
 
+export const UNREADABLE = new DOMException("", "NotReadableError");
+
 export class Playback {
-  /** @param {HTMLVideoElement} video */
-  constructor(video) {
+  /** @param {HTMLVideoElement} video
+   * @param {File} file */
+  constructor(video, file) {
     this.video = video;
     this.isSeeking = false;
+    /** @type {(error?: unknown) => void} Ends it with an error; without one, where the file is gone. */
+    this.fail = () => {};
+    /** @type {Promise<never>} Fails when the rest cannot be played. */
+    this.broken = new Promise((_, reject) => {
+      this.fail = async (error) => {
+        const isThere = await isReadable(file);
+        if (error || !isThere) reject(isThere ? error : UNREADABLE);
+      };
+    });
+    this.broken.catch(() => undefined);
+    // Browsers try for half a minute to read a file that is gone, and tell nothing meanwhile.
+    video.onwaiting = video.onseeking = () => this.fail();
+    video.onerror = () => this.fail(new DOMException("", "EncodingError"));
+  }
+
+  /** Goes to a time, or fails.
+   * @param {number} time */
+  reach(time) {
+    return Promise.race([this.broken, this.seek(time)]);
   }
 
   /** Goes to a time and waits until its frame is shown.

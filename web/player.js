@@ -3,7 +3,7 @@
 import { button } from "./dom.js";
 import { DRAW, TAP } from "./editing.js";
 import { close } from "./frames.js";
-import { BEGINNING, FOLLOWING, GO_ON } from "./message.js";
+import { BEGINNING, FOLLOWING } from "./message.js";
 
 export class Player {
   /** @param {import("./page.js").Page} page */
@@ -44,9 +44,7 @@ export class Player {
     try {
       await run.wake?.();
     } catch (error) {
-      if (run !== page.run) return;
-      page.enter(state);
-      page.fail(error, () => this.goOn(), GO_ON);
+      if (run === page.run) page.rest(error);
     }
   }
 

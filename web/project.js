@@ -151,7 +151,7 @@ function fitting(source, project) {
   throw new Error(fault);
 }
 
-/** Takes a project file, alone or with its video, and the video of a project that was opened without.
+/** Takes a project file, alone or with its video, and the video of a project that was opened without, or is gone.
  * @param {Keeping} keeping
  * @param {File[]} files
  * @returns {Promise<boolean>} Whether it did. */
@@ -159,7 +159,7 @@ export async function take(keeping, files) {
   const file = await projectIn(files);
   const { run } = keeping.page;
   if (file) await openProject(keeping, file, files.filter((other) => other !== file));
-  else if (run?.source.isAbsent && !run.source.isLive) await takeVideo(keeping, run, files);
+  else if (run && !run.source.isLive && (run.source.isAbsent || run.isGone)) await takeVideo(keeping, run, files);
   else return false;
   return true;
 }
@@ -171,10 +171,10 @@ export async function take(keeping, files) {
 async function takeVideo(keeping, run, files) {
   const project = projectOf(run);
   const states = statesOf(run);
-  const { id } = keeping;
+  const [{ id }, { isAbsent, name }] = [keeping, run.source];
   const open = async () => {
     const source = await openFiles(files);
-    return source.name === project.video.name ? fitting(source, project) : source;
+    return isAbsent && source.name === name ? fitting(source, project) : source;
   };
   const resume = async (/** @type {Run} */ opened) =>
     !unlike(opened.source, project) && keeping.resume(opened, project, states, id);

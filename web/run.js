@@ -66,6 +66,11 @@ export class Run {
     this.isRedoing = false;
   }
 
+  /** Whether its files are gone or were changed: they are to be chosen again. */
+  get isGone() {
+    return isUnreadable(this.failure);
+  }
+
   get isLocal() {
     return this.client instanceof LocalClient;
   }
@@ -256,15 +261,14 @@ export class Run {
     const isBusy = this.underWay.length > 0 || this.drawn || this.isRedoing;
     if (isBusy || this.isResting) return;
     if (this.hasAll) this.told.end();
-    else if (this.failure) this.end(this.failure);
+    else if (this.failure) this.end();
   }
 
-  /** The source has no more frames that can be had: those before are kept.
-   * @param {unknown} failure */
-  end(failure) {
+  /** The source has no more frames that can be had: those before are kept. */
+  end() {
     this.rest();
-    if (this.source.isFetched || isUnreadable(failure)) this.told.rest(failure);
-    else this.told.fail(failure);
+    if (this.source.isFetched || this.isGone) this.told.rest(this.failure);
+    else this.told.fail(this.failure);
   }
 
   /** @param {unknown} error */

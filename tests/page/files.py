@@ -1,6 +1,7 @@
 """Video files in the page: every frame once, boxes in the file's own pixels, a video that can be saved."""
 
 import json
+import os
 import statistics
 
 from browser import DRAW, distance, drag, drawn_frames, frames, kept_rows, rows, said, saved, slow, stop, to_the_end
@@ -158,7 +159,8 @@ def file_that_is_gone(checks):
         page.locator("#pause").click()
         spoil()
         page.locator("#pause").click()
-        said(page, "The file cannot be read: it was moved, changed or removed.")
+        said(page, "The file cannot be read: it was moved, changed or removed. Choose gone.mp4 again.")
+        assert page.locator("#resume").is_hidden()
         count = len(kept_rows(page))
         assert 8 <= count < FRAMES, count
         page.reload()
@@ -270,6 +272,61 @@ def paused_past_the_expiry(checks):
     service.stop()
 
 
+HOLE = 600 << 20
+"""Bytes of nothing: more than a browser reads ahead, and than the page copies. They take no room on the disk."""
+
+
+def holed_file(checks, name):
+    """A video whose last part lies far behind the others."""
+    whole = checks.files.file("slow.mp4", 10, (*H264, "-b:v", "8M"), turned="noise=alls=20:allf=t")
+    data = bytearray(whole.read_bytes())
+    table = data.rindex(b"stco") + 12
+    count = int.from_bytes(data[table - 4 : table], "big")
+    places = range(table, table + 4 * count, 4)
+    behind = places[3 * count // 4 :]
+    cut = int.from_bytes(data[behind[0] :][:4], "big")
+    for place in [data.index(b"mdat") - 4, *behind]:
+        data[place : place + 4] = (int.from_bytes(data[place : place + 4], "big") + HOLE).to_bytes(4, "big")
+    path = checks.files.folder / name
+    with path.open("wb") as file:
+        file.write(data[:cut])
+        file.seek(HOLE, 1)
+        file.write(data[cut:])
+    return path
+
+
+def file_gone_over_plain_http(checks):
+    """A file that is removed or changed while it is played is to be chosen again. It goes on then where it stood; another
+    one that is chosen is tracked for itself."""
+    service = Service(checks.program, "--allowed-hosts", "machine.test")
+    browser = checks.launch("--host-resolver-rules=MAP machine.test 127.0.0.1")
+    url = f"http://machine.test:{service.port}"
+    path = holed_file(checks, "gone.mp4")
+    # Browsers look at the second in which it was changed last.
+    for spoil in (path.unlink, lambda: os.utime(path, (1, 1))):
+        page = checks.page(url=url, browser=browser, where="here", allowed=("Cross-Origin-Opener-Policy", "Failed to load"))
+        choose_file(page, path)
+        drag(page, sent_box(checks.files.truth[0]))
+        frames(page, 8)
+        page.locator("#pause").click()
+        spoil()
+        page.locator("#pause").click()
+        said(page, "The file cannot be read: it was moved, changed or removed. Choose gone.mp4 again.")
+        assert page.locator("#resume").is_hidden()
+        before = kept_rows(page)
+        holed_file(checks, "gone.mp4")
+        page.locator("#file").set_input_files(path)
+        said(page, f"gone.mp4 is here again, with {len(before)} frames.")
+        page.locator("#pause").click()
+        frames(page, len(before) + 8)
+        stop(page)
+        table = rows(page)
+        assert table[: len(before)] == before and [int(row["frame"]) for row in table] == list(range(len(table)))
+        page.context.close()
+    browser.close()
+    service.stop()
+
+
 def plain_http(checks):
     """A page that came over http from another machine: no camera, no encoder of videos; the rest works."""
     service = Service(checks.program, "--allowed-hosts", "machine.test")
@@ -304,4 +361,5 @@ ALL = [
     service_killed,
     paused_past_the_expiry,
     plain_http,
+    file_gone_over_plain_http,
 ]
