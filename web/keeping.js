@@ -235,8 +235,9 @@ export class Keeping {
    * @param {Project} project
    * @param {Kept["states"]} states
    * @param {string} [id] Its entry.
-   * @returns {Promise<true>} */
+   * @returns {Promise<boolean>} Not where there is nothing: it waits for a first box. */
   async resume(run, project, states, id) {
+    if (project.objects.length === 0) return false;
     const left = this.arrived(id);
     (await projects()).adopt(run, project);
     for (const object of run.objects) object.saves = [states[object.number]].filter((state) => !!state);
@@ -288,8 +289,8 @@ async function wake(run, open) {
   } catch (error) {
     // It can be tried again; where the run has failed meanwhile, with the source opened anew.
     run.wake ??= own;
-    run.isResting = true;
     run.failure = error;
+    run.isResting = true;
     run.leaveSessions();
     throw error;
   }

@@ -79,6 +79,7 @@ export class Opening {
     page.beginning.reset();
     page.preview();
     get("picture").scrollIntoView({ block: "nearest" });
-    page.say(TAP + DRAW + (source.note ?? "") + this.arrived());
+    const asked = source.isAbsent ? `The project has no boxes. Choose ${source.name} to draw one.` : TAP + DRAW;
+    page.say(asked + (source.note ?? "") + this.arrived());
   }
 }

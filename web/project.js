@@ -71,7 +71,7 @@ function readProject(document) {
       Array.isArray(row) && row.slice(0, 7).every(Number.isFinite) && STATUSES.includes(row[7]);
     if (!Array.isArray(rows) || !rows.every(isRow)) throw new Error(`${NOT_ONE}a row of it is damaged.`);
   }
-  return project;
+  return { ...project, objects: objects.filter(({ rows }) => rows.length > 0) };
 }
 
 /** Brings objects and rows into a run that has none.
@@ -164,7 +164,7 @@ export async function take(keeping, files) {
   return true;
 }
 
-/** Takes the video of a project that was opened without; opens another one for itself.
+/** Takes the video of a project; opens another one for itself. One that is gone has its name.
  * @param {Keeping} keeping
  * @param {Run} run
  * @param {File[]} files */
@@ -177,7 +177,7 @@ async function takeVideo(keeping, run, files) {
     return isAbsent && source.name === name ? fitting(source, project) : source;
   };
   const resume = async (/** @type {Run} */ opened) =>
-    !unlike(opened.source, project) && keeping.resume(opened, project, states, id);
+    (isAbsent || opened.source.name === name) && !unlike(opened.source, project) && keeping.resume(opened, project, states, id);
   await keeping.page.opening.choose(open, resume);
 }
 

@@ -313,6 +313,27 @@ def half_tracked_project(checks):
     assert page.locator("#results").is_hidden()
     page.context.close()
 
+def project_without_objects(checks):
+    """A project that one wrote by hand, with no objects or with one that has no rows, is opened and takes a first box."""
+    path = checks.files.file("clip.mp4", 30, H264)
+    video = {"name": "clip.mp4", "width": 1056, "height": 792}
+    project = {"bagtrack_project": 1, "video": video, "ended": False, "skipped": 0, "objects": []}
+    empty = checks.files.folder / "empty.bagtrack.json"
+    nothing = {"number": 0, "name": "van", "color": "#ffb000", "shown": True, "rows": []}
+    for objects, together in (([], True), ([nothing], False)):
+        empty.write_text(json.dumps({**project, "objects": objects}))
+        page = checks.page(where="here")
+        page.locator("#file").set_input_files([empty, path] if together else empty)
+        if not together:
+            said(page, "Choose clip.mp4 to draw one")
+            page.locator("#file").set_input_files(path)
+        said(page, DRAW)
+        drag(page, sent_box(checks.files.truth[0]))
+        to_the_end(page)
+        assert len(rows(page)) == FRAMES
+        page.context.close()
+
+
 
 READ_LATE = """() => {
     const own = Blob.prototype.text;
@@ -456,6 +477,7 @@ def project_without_its_video(checks):
 
 
 ALL = [
+    project_without_objects,
     half_tracked_project,
     refused_project_overtaken,
     project_of_many_rows,
