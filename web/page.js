@@ -180,6 +180,7 @@ export class Page {
     // Another box may have been drawn meanwhile.
     if (own !== this.run || state !== "first") return;
     this.enter("following");
+    this.stage.draw(box, own.source.size.width);
     this.say(BEGINNING);
     try {
       // The bar has gone on since: the box is of what was shown.
@@ -191,9 +192,10 @@ export class Page {
       if (this.state !== "ended") this.say(FOLLOWING);
     } catch (error) {
       if (own !== this.run) return;
-      this.stage.draw(undefined);
       this.enter("first");
       this.fail(error, () => this.follow(own, box));
+      // It waits for a key.
+      if (get("key-form").hidden) this.stage.draw(undefined);
     }
   }
 

@@ -41,6 +41,7 @@ from browser import (
     kept_rows,
     near,
     numbers,
+    painted,
     rows,
     said,
     saved,
@@ -392,6 +393,18 @@ def key_needed(checks):
     for key, says in (("not the key", "does not know this key"), ("0123456789abcdef", "Following")):
         page.locator("#key").fill(key)
         page.keyboard.press("Enter")
+    # The box stays while one types the key, and until the service has answered.
+    painted(page, "overlay")
+    held = []
+    opening = "**/sessions/*?box=*"
+    page.route(opening, lambda route: held.append(route))
+    page.locator("#key").fill("neither")
+    with page.expect_request(opening):
+        page.keyboard.press("Enter")
+    painted(page, "overlay")
+    held[0].continue_()
+    said(page, "does not know this key")
+    page.unroute(opening)
         said(page, says)
     frames(page, 20)
     page.context.close()
