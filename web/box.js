@@ -41,7 +41,10 @@ export class BoxDrawing {
     canvas.addEventListener("pointerdown", (event) => this.down(event));
     canvas.addEventListener("pointermove", (event) => this.move(event));
     canvas.addEventListener("pointerup", (event) => this.up(event));
-    canvas.addEventListener("pointercancel", ({ pointerId }) => pointerId === this.pointer && this.cancel());
+    // Where its end is not told: the browser takes the pointer, or another window has it.
+    const lost = () => this.from && this.cancel();
+    canvas.addEventListener("lostpointercapture", ({ pointerId }) => pointerId === this.pointer && lost());
+    addEventListener("blur", lost);
     canvas.addEventListener("keydown", (event) => this.key(event));
   }
 
@@ -69,7 +72,8 @@ export class BoxDrawing {
   /** @param {PointerEvent} event */
   down(event) {
     if (event.pointerType === "touch" && !this.isArmed) return;
-    if (event.button !== 0 || this.from || !this.told.start()) return;
+    const isOther = this.from && event.pointerId !== this.pointer;
+    if (event.button !== 0 || isOther || !this.told.start()) return;
     this.canvas.setPointerCapture(event.pointerId);
     this.pointer = event.pointerId;
     this.from = this.at(event);

@@ -1,8 +1,9 @@
 """Keyboards and fingers: where the focus goes, keys of other letters, a second finger."""
 
 import json
+import time
 
-from browser import choose, corners, drag, frames, said, saved, to_the_end
+from browser import TO_THE_END, choose, corners, drag, frames, said, saved, to_the_end
 from studio import shown, to_frame
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True, "device_scale_factor": 2}
@@ -111,4 +112,54 @@ def second_finger(checks):
     page.context.close()
 
 
-ALL = [objects_by_keyboard, keyboard_of_other_letters, second_finger]
+def drag_that_does_not_end(checks):
+    """Where another window takes the focus while a box is drawn, and where the browser takes the finger, no end of it is
+    told: the box is given up, and the next one is drawn from where it begins."""
+    page = checks.page(where="here", **PHONE)
+    choose(page, "card")
+    page.locator("#picture").scroll_into_view_if_needed()
+    truth = checks.clips["card"]["truth"][0]
+    (left, top), (right, bottom) = corners(page, truth)
+    hand = page.context.new_cdp_session(page)
+    over = lambda: page.evaluate("document.getElementById('overlay').toDataURL()")
+    nothing = over()
+
+    def shows(is_box):
+        late = time.monotonic() + TO_THE_END / 1000
+        while (over() != nothing) != is_box:
+            assert time.monotonic() < late, "the box is still there" if not is_box else "no box is drawn"
+            page.wait_for_timeout(20)
+
+    def mouse(kind, x, y, **more):
+        hand.send("Input.dispatchMouseEvent", {"type": kind, "x": x, "y": y, **more})
+
+    def finger(kind, *points):
+        touches = [{"x": x, "y": y} for x, y in points]
+        hand.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touches})
+
+    held = {"button": "left", "buttons": 1, "clickCount": 1}
+    mouse("mousePressed", right + 60, top - 20, **held)
+    mouse("mouseMoved", left, top, **held)
+    shows(True)
+    page.evaluate("() => void dispatchEvent(new Event('blur'))")
+    shows(False)
+    mouse("mouseMoved", right, bottom)
+    shows(False)
+    page.locator("#draw").tap()
+    page.locator("#picture").scroll_into_view_if_needed()
+    (left, top), (right, bottom) = corners(page, truth)
+    finger("touchStart", (right + 60, top - 20))
+    finger("touchMove", (left, top))
+    shows(True)
+    finger("touchCancel")
+    shows(False)
+    finger("touchStart", (left, top))
+    finger("touchMove", (right, bottom))
+    finger("touchEnd")
+    frames(page, 5)
+    row = json.loads(saved(page, "#save-project"))["objects"][0]["rows"][0]
+    assert all(abs(drawn - side) < 4 for drawn, side in zip(row[2:6], truth)), (row, truth)
+    page.context.close()
+
+
+ALL = [objects_by_keyboard, keyboard_of_other_letters, second_finger, drag_that_does_not_end]
