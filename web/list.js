@@ -31,8 +31,11 @@ export class ObjectList {
     for (const [object, item] of items) if (!objects.includes(object)) this.remove(object, item);
     objects.forEach((object, at) => {
       if (items.has(object)) return;
-      items.set(object, this.item(object));
-      place.insertBefore(/** @type {HTMLElement} */ (items.get(object)), place.children[at]);
+      const item = this.item(object);
+      items.set(object, item);
+      place.insertBefore(item, place.children[at]);
+      // It comes back: Enter would delete the one beside it.
+      if (place.querySelector(".remove:focus-visible")) item.querySelector("input")?.focus();
     });
     [...place.children].forEach((item, at) => item.classList.toggle("chosen", objects[at] === chosen));
     place.querySelectorAll("input[type=radio]").forEach((radio, at) => {

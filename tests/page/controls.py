@@ -45,6 +45,13 @@ def objects_by_keyboard(checks):
         page.keyboard.press("Enter")
         page.get_by_label(f"Delete {left}").wait_for()
         assert page.evaluate(FOCUS) == f"Delete {left}", page.evaluate(FOCUS)
+    # One that comes back has the focus: Enter would delete the one beside it.
+    page.keyboard.press("Control+z")
+    page.get_by_label("Delete bus").wait_for()
+    assert page.evaluate(FOCUS) == "Choose bus", page.evaluate(FOCUS)
+    page.locator("#list button.remove").nth(1).focus()
+    page.keyboard.press("Enter")
+    page.get_by_label("Delete bus").wait_for(state="detached")
     # An object that comes back does not take the focus from a name.
     names.nth(1).focus()
     page.locator("#undo").evaluate("button => button.click()")
