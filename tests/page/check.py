@@ -211,6 +211,9 @@ def phone_by_touch(checks):
     assert width <= 390, f"{width} px wide"
     small = page.evaluate(SMALL, LEAST_TARGET)
     assert not small, small
+    # Phones zoom in on what one writes into with smaller letters.
+    letters = page.locator("#list input[type=text]").evaluate("input => parseFloat(getComputedStyle(input).fontSize)")
+    assert letters >= 16, letters
     to_the_end(page)
     stays_while_scrolled(page)
     table = rows(page)
@@ -390,9 +393,6 @@ def key_needed(checks):
     drag(page, checks.clips["card"]["truth"][0])
     said(page, "asks for an API key")
     checks.shot(page, "key-light")
-    for key, says in (("not the key", "does not know this key"), ("0123456789abcdef", "Following")):
-        page.locator("#key").fill(key)
-        page.keyboard.press("Enter")
     # The box stays while one types the key, and until the service has answered.
     painted(page, "overlay")
     held = []
@@ -405,6 +405,9 @@ def key_needed(checks):
     held[0].continue_()
     said(page, "does not know this key")
     page.unroute(opening)
+    for key, says in (("not the key", "does not know this key"), ("0123456789abcdef", "Following")):
+        page.locator("#key").fill(key)
+        page.keyboard.press("Enter")
         said(page, says)
     frames(page, 20)
     page.context.close()
