@@ -10,6 +10,9 @@ const FRAMES_A_SECOND = 25;
 const LONGEST_COMMENT = 64;
 const IMAGE = /\.(jpe?g|png|webp|bmp|gif|avif|hei[cf]|tiff?)$/i;
 
+/** Kinds that few browsers read. */
+const RARE = /\.(hei[cf]|tiff?)$/i;
+
 /** Whether a file is an image that a browser may show.
  * @param {File} file */
 export const isImage = (file) => file.type.startsWith("image/") || IMAGE.test(file.name);
@@ -82,9 +85,12 @@ export async function openAnimated(file) {
  * @param {string[]} [names] Their paths in their folder, in the order of the files, where they have been opened before. */
 export async function openImages(files, names) {
   const order = new Intl.Collator("en", { numeric: true });
-  const images = files.filter(isImage);
+  let images = files.filter(isImage);
   if (!names) images.sort((one, other) => order.compare(pathOf(one), pathOf(other)));
   if (images.length === 0) throw new DOMException("", "NotSupportedError");
+  const [rare, others] = [true, false].map((isRare) => images.filter(({ name }) => RARE.test(name) === isRare));
+  const isLeftOut = others.length > 0 && rare.length > 0 && !(await createImageBitmap(rare[0]).catch(() => undefined));
+  if (isLeftOut) images = others;
   const folder = pathOf(images[0]).split("/").slice(0, -1).pop();
   /** @type {{width: number, height: number} | undefined} */
   let size;
@@ -114,6 +120,8 @@ export async function openImages(files, names) {
   await source.first();
   source.size = size ?? source.size;
   source.files = images;
+  const more = rare.length > 1 ? ` and ${rare.length - 1} more` : "";
+  if (isLeftOut) source.note = ` Left out, for this browser cannot read it: ${rare[0].name}${more}.`;
   // Without the folder that was chosen.
   source.imageNames = names ?? images.map((image) => pathOf(image).replace(/^[^/]*\//, ""));
   return source;

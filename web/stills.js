@@ -40,6 +40,8 @@ export class Stills {
     this.isStopped = false;
     /** @type {File[] | undefined} Where they are files of this machine. */
     this.files = undefined;
+    /** @type {string | undefined} What is to be said once it is open. */
+    this.note = undefined;
     /** @type {string[] | undefined} How they are called, where each is a file. */
     this.imageNames = undefined;
     /** @type {(() => void) | undefined} */

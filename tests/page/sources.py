@@ -89,6 +89,24 @@ def folder_with_a_damaged_image(checks):
         page.context.close()
 
 
+def folder_of_a_phone(checks):
+    """Photos of a kind that the browser does not read are left out of a folder, which is said; the others are tracked."""
+    folder = checks.files.folder / "photos"
+    folder.mkdir(exist_ok=True)
+    for index in range(COUNT):
+        (folder / f"image{index}.jpg").write_bytes(checks.service.bytes(f"/sample/card/{3 * index}.jpg"))
+    for index in (0, 7, 30):
+        (folder / f"image{index}b.HEIC").write_bytes(b"\0\0\0\x18ftypheic")
+    page = checks.page(where="here")
+    page.locator("#folder").set_input_files(folder)
+    said(page, "Left out, for this browser cannot read it: image0b.HEIC and 2 more.")
+    drag(page, checks.clips["card"]["truth"][0])
+    to_the_end(page)
+    coco = json.loads(saved(page, "#save-coco"))
+    assert [image["file_name"] for image in coco["images"]] == [f"image{index}.jpg" for index in range(COUNT)]
+    page.context.close()
+
+
 HANDED = """([kind, names, type, content]) => {
     const bytes = Uint8Array.from(atob(content), (sign) => sign.charCodeAt(0));
     const data = new DataTransfer();
@@ -369,6 +387,7 @@ ALL = [
     steps_in_open_groups,
     folder_of_images,
     folder_with_a_damaged_image,
+    folder_of_a_phone,
     dropped_and_pasted,
     recorded_in_a_browser,
     begun_in_the_middle,
