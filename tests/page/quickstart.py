@@ -15,6 +15,8 @@ def quickstart(checks):
     assert labels == ["Sample clip", "Add an object", "Stop", *SAVED_BY], labels
     page = checks.page(where="here")
     press = lambda label: page.get_by_role("button", name=label, exact=True).click()
+    # It waits for this frame: it cannot have ended when one acts.
+    page.route("**/sample/card/120.jpg", lambda route: None)
     press(labels[0])
     said(page, DRAW)
     drag(page, checks.clips["card"]["truth"][0])
