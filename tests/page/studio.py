@@ -300,13 +300,20 @@ def colors_of_the_system(checks):
 
 
 def whole_picture(checks):
-    """On a low screen the bar covers nothing of the picture in which one is to draw, and the first screen is filled."""
+    """On a low screen the bar covers nothing of the picture in which one is to draw, and the first screen is filled. On a
+    narrow one what the page says covers nothing of it, also where the first screen was scrolled."""
     page = checks.page(where="here", viewport={"width": 844, "height": 390}, has_touch=True, is_mobile=True)
     panel, welcome = (page.locator(name).bounding_box()["width"] for name in (".panel", "#welcome"))
     assert panel == welcome, (panel, welcome)
     choose_file(page, checks.files.file("clip.mp4", 30, H264))
     picture, controls = (page.locator(name).bounding_box() for name in ("#picture", "#controls"))
     assert picture["y"] >= 0 and picture["y"] + picture["height"] <= controls["y"], (picture, controls)
+    page.context.close()
+    page = checks.page(where="here", viewport={"width": 390, "height": 700}, has_touch=True, is_mobile=True)
+    page.locator("#program").scroll_into_view_if_needed()
+    choose_file(page, checks.files.file("clip.mp4", 30, H264))
+    picture, message = (page.locator(name).bounding_box() for name in ("#picture", "#message"))
+    assert message["width"] == 390 and picture["y"] >= message["y"] + message["height"], (picture, message)
     page.context.close()
 
 
