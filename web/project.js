@@ -78,9 +78,11 @@ function readProject(document) {
  * @param {Run} run
  * @param {Project} project */
 export function adopt(run, project) {
-  for (const { number, name, color, shown, rows } of project.objects) {
+  for (const [at, { number = at, name, color, shown, rows }] of project.objects.entries()) {
     const object = new FollowedObject(Number(number), run.follower());
-    Object.assign(object, { name: String(name), color: String(color), isShown: shown !== false });
+    object.name = String(name ?? object.name);
+    object.color = String(color ?? object.color);
+    object.isShown = shown !== false;
     for (const row of rows.map(rowOf)) {
       object.set(row);
       run.frames.times.set(row.frame, row.time);

@@ -334,6 +334,23 @@ def project_without_objects(checks):
         page.context.close()
 
 
+def project_of_rows_alone(checks):
+    """Objects of a project that one wrote by hand, which has their rows alone, have names and numbers, and go on."""
+    path = checks.files.file("clip.mp4", 30, H264)
+    objects = [{"rows": [[0, 0, *box, 1, "tracking", 1]]} for box in (checks.files.truth[0], [20, 20, 60, 60])]
+    video = {"name": "clip.mp4", "width": 1056, "height": 792}
+    project = checks.files.folder / "rows.bagtrack.json"
+    project.write_text(json.dumps({"bagtrack_project": 1, "video": video, "objects": objects}))
+    page = checks.page(where="here")
+    page.locator("#file").set_input_files([project, path])
+    said(page, "clip.mp4 is here again, with 1 frames.")
+    page.locator("#pause").click()
+    to_the_end(page)
+    assert {(row["target"], row["name"]) for row in rows(page)} == {("0", "Object 1"), ("1", "Object 2")}
+    assert len(rows(page)) == 2 * FRAMES
+    page.context.close()
+
+
 READ_LATE = """() => {
     const own = Blob.prototype.text;
     let isRead;
@@ -478,6 +495,7 @@ def project_without_its_video(checks):
 ALL = [
     half_tracked_project,
     project_without_objects,
+    project_of_rows_alone,
     refused_project_overtaken,
     project_of_many_rows,
     nothing_may_be_kept,
