@@ -174,6 +174,36 @@ def file_that_is_gone(checks):
         page.context.close()
 
 
+def file_changed_after_a_stop(checks):
+    """A file that was changed after a stop is to be chosen again before one goes on. Another file of its size is a video
+    of its own."""
+    whole = checks.files.file("clip.mp4", 30, H264).read_bytes()
+    path, other = (checks.files.folder / name for name in ("mine.mp4", "other.mp4"))
+    other.write_bytes(whole)
+    for chosen in (path, other):
+        path.write_bytes(whole)
+        page = checks.page(where="here")
+        slow(page)
+        choose_file(page, path)
+        drag(page, sent_box(checks.files.truth[0]))
+        frames(page, 20)
+        page.locator("#stop").click()
+        before = kept_rows(page)
+        os.utime(path, (1, 1))
+        page.locator("#resume").click()
+        said(page, "Choose mine.mp4 again.")
+        assert page.locator("#resume").is_hidden() and rows(page) == before
+        page.locator("#file").set_input_files(chosen)
+        if chosen == other:
+            said(page, DRAW)
+        else:
+            said(page, f"mine.mp4 is here again, with {len(before)} frames.")
+            page.locator("#pause").click()
+            to_the_end(page)
+            assert len(rows(page)) == FRAMES
+        page.context.close()
+
+
 def file_of_varying_rate(checks):
     """After a while three of seven frames are missing, and the frame before them stays for longer."""
     path, numbers = checks.files.varying_file()
@@ -356,6 +386,7 @@ ALL = [
     cut_in_its_first_frame,
     file_of_varying_rate,
     file_that_is_gone,
+    file_changed_after_a_stop,
     file_of_a_phone,
     file_with_corrections,
     service_killed,
