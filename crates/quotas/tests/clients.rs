@@ -8,15 +8,16 @@ use std::sync::Arc;
 use std::time::Duration;
 use uuid::Uuid;
 
-/// Clients of whom each may have 4 sessions and 6 requests in flight, and send 10 frames a second, 20 at once.
+/// Clients of whom each may have 4 sessions and 6 requests in flight, and send a frame a second, 200 at once: so few
+/// come back that a slow machine counts as one that is not.
 fn clients() -> Clients {
     let mut config = Config {
-        max_frames: 20,
+        max_frames: 200,
         ..Config::default()
     };
     config.limits.client_sessions = Some(4);
     config.limits.client_requests = Some(6);
-    config.limits.client_frame_rate = 10;
+    config.limits.client_frame_rate = 1;
     Clients::new(&config, false)
 }
 
@@ -60,19 +61,23 @@ fn a_page_has_half_of_its_keys_requests_and_takes_no_more_than_it_leaves() {
 fn frames_of_a_page_count_as_its_keys() {
     let clients = clients();
     let (of_key, of_page) = (clients.account(&key()), clients.account(&page()));
-    assert_eq!(of_page.count_frames(15), Ok(()));
+    assert_eq!(of_page.count_frames(150), Ok(()));
     let (_, left) = of_key.frames().expect("they are counted");
-    assert!((5..10).contains(&left), "{left} are left");
-    assert_eq!(of_key.count_frames(5), Ok(()));
-    let refused = of_page.count_frames(20).unwrap_err();
-    assert_eq!((refused.what, refused.limit), ("frames a second", 10));
-    let most = Duration::from_secs(2);
+    assert!((50..100).contains(&left), "{left} are left");
+    assert_eq!(of_key.count_frames(50), Ok(()));
+    let refused = of_page.count_frames(200).unwrap_err();
+    assert_eq!((refused.what, refused.limit), ("frames a second", 1));
+    let most = Duration::from_secs(200);
     assert!(
         refused.wait > most / 2 && refused.wait <= most,
         "{refused:?}"
     );
     let other = clients.account(&address(1));
-    assert_eq!(other.count_frames(20), Ok(()), "another client has its own");
+    assert_eq!(
+        other.count_frames(200),
+        Ok(()),
+        "another client has its own"
+    );
 }
 
 #[test]
