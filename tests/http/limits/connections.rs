@@ -26,11 +26,20 @@ async fn an_idle_connection_is_closed() {
     let app = TestApplication::start_with(|config| config.header_timeout = SHORT).await;
     let mut connection = RawConnection::open(app.address).await;
     assert_eq!(connection.read_to_end().await, "");
-    let mut connection = RawConnection::open(app.address).await;
-    connection
-        .send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
-        .await;
-    let answer = connection.read_to_end().await;
+    // One that asks on a busy machine may be idle for too long before.
+    let asked = async {
+        loop {
+            let mut connection = RawConnection::open(app.address).await;
+            let ask = "GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n";
+            if connection.try_send(ask).await.is_ok() {
+                let answer = connection.read_to_end().await;
+                if !answer.is_empty() {
+                    break answer;
+                }
+            }
+        }
+    };
+    let answer = within(asked, "one is answered").await;
     assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
 }
 

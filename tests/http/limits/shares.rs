@@ -410,18 +410,17 @@ async fn posts_of_two_frames_do_not_wait_until_the_long_posts_of_another_client_
     assert!(long.try_join_next().is_none(), "the long posts go on");
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn slow_frames_among_cheap_refused_posts_hold_not_all_quick_workers() {
-    let app = TestApplication::start_with(|config| {
-        behind_a_proxy(config);
-        config.workers = Some(2);
-    });
-    let app = Arc::new(app.await);
+/// How long two large frames of a client took after refused posts of it that took no time; and of another client's
+/// frames beside them, how many there were, and the time of the slowest.
+async fn beside_slow_frames(
+    app: &TestApplication,
+    (cheap, modest): (&str, &str),
+) -> (Duration, u32, Duration) {
     let query = [("box", "2000,1500,1600,1200")];
     let picture = heavy::large(10);
     let slow = async |count: usize| {
         let requests = (0..count).map(|_| {
-            let request = request_as(&app, GREEDY, "/sessions", &query);
+            let request = request_as(app, GREEDY, "/sessions", &query);
             request.body(picture.clone()).send()
         });
         let sent = Instant::now();
@@ -430,10 +429,9 @@ async fn slow_frames_among_cheap_refused_posts_hold_not_all_quick_workers() {
         }
         sent.elapsed()
     };
-    let (cheap, modest) = (open(&app, GREEDY).await, open(&app, MODEST).await);
     slow(1).await;
     for _ in 0..60 {
-        let junk = request_as(&app, GREEDY, &format!("/sessions/{cheap}/frames"), &[]);
+        let junk = request_as(app, GREEDY, &format!("/sessions/{cheap}/frames"), &[]);
         let answer = junk.body("no image at all").send().await.unwrap();
         assert_eq!(answer.status(), StatusCode::UNSUPPORTED_MEDIA_TYPE);
     }
@@ -443,7 +441,7 @@ async fn slow_frames_among_cheap_refused_posts_hold_not_all_quick_workers() {
         while is_done.try_recv().is_err() {
             number += 1;
             let sent = Instant::now();
-            let post = request_as(&app, MODEST, &format!("/sessions/{modest}/frames"), &[]);
+            let post = request_as(app, MODEST, &format!("/sessions/{modest}/frames"), &[]);
             let answer = post.body(pictures::png(number)).send().await.unwrap();
             expect(answer, StatusCode::OK).await;
             slowest = slowest.max(sent.elapsed());
@@ -456,11 +454,28 @@ async fn slow_frames_among_cheap_refused_posts_hold_not_all_quick_workers() {
         took
     };
     let (took, (number, slowest)) = tokio::join!(attack, frames);
-    println!("{number} frames beside {took:?}, the slowest after {slowest:?}");
-    assert!(
-        number > 5 && slowest < took / 3,
-        "{number}, {slowest:?} of {took:?}"
-    );
+    (took, number, slowest)
+}
+
+/// A busy machine may stop any process for a while; a service whose workers are all held stalls each time.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn slow_frames_among_cheap_refused_posts_hold_not_all_quick_workers() {
+    let app = TestApplication::start_with(|config| {
+        behind_a_proxy(config);
+        config.workers = Some(2);
+    });
+    let app = app.await;
+    let (cheap, modest) = (open(&app, GREEDY).await, open(&app, MODEST).await);
+    let mut stalls = Vec::new();
+    while stalls.len() < 3 {
+        let (took, number, slowest) = beside_slow_frames(&app, (&cheap, &modest)).await;
+        println!("{number} frames beside {took:?}, the slowest after {slowest:?}");
+        if number > 5 && slowest < took / 3 {
+            return;
+        }
+        stalls.push((took, number, slowest));
+    }
+    panic!("{stalls:?}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -339,21 +339,26 @@ fn large_jpeg(t: u32) -> Vec<u8> {
     pictures::encode(picture, ImageFormat::Jpeg)
 }
 
+/// A busy machine may be held up over the far line alone; a stream that waits for each answer is so each time.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_stream_does_not_wait_a_round_trip_for_each_frame() {
     const FRAMES: u32 = 100;
     const ROUND_TRIP: Duration = Duration::from_millis(80);
     let app = TestApplication::start().await;
     let line = SlowLine::to(app.address, ROUND_TRIP / 2).await;
-    let near = time_of_frames(&app, app.address, FRAMES).await;
-    let far = time_of_frames(&app, line.address, FRAMES).await;
-    let rate = f64::from(FRAMES) / far.as_secs_f64();
-    println!("{rate:.1} frames/s over a round trip of 80 ms: {far:?}, and {near:?} without it");
-    // One that waits for each answer takes a hundred round trips longer, eight seconds.
-    assert!(
-        far < near + FRAMES * ROUND_TRIP * 3 / 4,
-        "{far:?} after {near:?}"
-    );
+    let mut late = Vec::new();
+    while late.len() < 3 {
+        let near = time_of_frames(&app, app.address, FRAMES).await;
+        let far = time_of_frames(&app, line.address, FRAMES).await;
+        let rate = f64::from(FRAMES) / far.as_secs_f64();
+        println!("{rate:.1} frames/s over a round trip of 80 ms: {far:?}, and {near:?} without it");
+        // One that waits for each answer takes a hundred round trips longer, eight seconds.
+        if far < near + FRAMES * ROUND_TRIP * 3 / 4 {
+            return;
+        }
+        late.push((near, far));
+    }
+    panic!("{late:?}");
 }
 
 /// How long a stream of large frames by this address takes, of which eight are on their way: more than that a phone has no
@@ -428,6 +433,8 @@ async fn a_message_has_the_time_of_a_body_however_fast_its_bytes_come() {
     let problem = loop {
         client.send_raw(&[0; 4_096]).await;
         tokio::select! {
+            // Where both are there on a busy machine, the stream has ended: nothing more can be sent.
+            biased;
             problem = client.message() => break problem,
             () = tokio::time::sleep(Duration::from_millis(100)) => {}
         }

@@ -368,7 +368,8 @@ async fn of_a_video_that_needs_too_much_memory_it_is_told_how_to_make_it_smaller
 async fn one_client_has_a_video_at_a_time_and_another_client_gets_the_next_place() {
     let app = TestApplication::start_with(|config| {
         config.workers = Some(1);
-        config.work_timeout = Duration::from_secs(2);
+        // In which a busy machine has a first picture.
+        config.work_timeout = Duration::from_secs(5);
         behind_a_proxy(config);
     });
     let app = app.await;

@@ -22,7 +22,7 @@ fn issued() -> (Authority, Files) {
 #[tokio::test]
 async fn a_handshake_has_to_end_in_time() {
     let (authority, files) = issued();
-    let limit = Duration::from_millis(300);
+    let limit = Duration::from_secs(1);
     let service = Service::start(Some(&files), |config| config.header_timeout = limit).await;
     let started = Instant::now();
     let mut slow = Vec::new();
@@ -44,7 +44,16 @@ async fn a_handshake_has_to_end_in_time() {
         client.ends().await;
     }
     assert!(started.elapsed() >= limit);
-    let mut client = Client::open(&trusting(&authority.root, &[]), service.address).await;
+    // A busy machine may take longer for a handshake than this service waits.
+    let connector = trusting(&authority.root, &[]);
+    let opened = async {
+        loop {
+            if let Ok(client) = Client::try_open(&connector, service.address).await {
+                break client;
+            }
+        }
+    };
+    let mut client = within(opened, "a handshake is made in time").await;
     assert_eq!(client.call("GET", "/healthz", b"").await.status(), "200");
     assert!(service.end().await);
 }
