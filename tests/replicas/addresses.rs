@@ -21,6 +21,10 @@ fn run(command: &mut Command) {
 async fn replicas_share_sessions(environment: &[(&str, &str)], store: &str) {
     let replica = || Replica::start_in(environment, &["--store", store]);
     let (replicas, clip, client) = ([replica(), replica()], Clip::of(0, FRAMES), Client::new());
+    for replica in &replicas {
+        // On a busy machine the store may be found late.
+        while replica.readiness().await != StatusCode::OK {}
+    }
     for _ in 0..4 {
         let path = format!("/sessions/{}", Uuid::new_v4());
         let request = client.put(replicas[0].url(&format!("{path}?box={}", clip.first_box)));

@@ -110,7 +110,7 @@ async fn a_frame_that_comes_late_to_another_replica_takes_nothing_back() {
 #[tokio::test]
 #[ignore = "needs redis"]
 async fn without_the_store_frames_are_refused_and_nothing_is_lost() {
-    let mut pair = Pair::open(&["--store-timeout", "300ms"], 12).await;
+    let mut pair = Pair::open(&["--store-timeout", "2s"], 12).await;
     let expected = pair.undisturbed().await;
     pair.take(0, 1..6).await;
     assert_eq!(pair.replicas[0].readiness().await, StatusCode::OK);

@@ -74,7 +74,8 @@ async fn a_session_can_be_ended_where_the_memory_is_used_up() {
 #[tokio::test]
 #[ignore = "needs redis"]
 async fn a_store_that_gives_no_answer_is_waited_for_once() {
-    let pair = Pair::open(&["--store-timeout", "500ms"], 8).await;
+    const PATIENCE: Duration = Duration::from_secs(3);
+    let pair = Pair::open(&["--store-timeout", "3s"], 8).await;
     let expected = pair.undisturbed().await;
     pair.take(0, 1..4).await;
     pair.redis.pause();
@@ -88,8 +89,8 @@ async fn a_store_that_gives_no_answer_is_waited_for_once() {
     }
     let others = asked.elapsed();
     // The rest is tracking, and a busy machine.
-    assert!(first < Duration::from_millis(2500), "{first:?}");
-    assert!(others < Duration::from_millis(2000), "{others:?}");
+    assert!(first < 2 * PATIENCE, "{first:?}");
+    assert!(others < PATIENCE, "{others:?}");
     pair.redis.go_on();
     while pair.replicas[0].readiness().await != StatusCode::OK {}
     pair.follow(0, 4..8, &expected).await;

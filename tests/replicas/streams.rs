@@ -83,7 +83,7 @@ async fn a_stream_goes_on_that_is_pinged_while_the_store_takes_its_frame() {
 #[tokio::test]
 #[ignore = "needs redis"]
 async fn a_frame_of_a_stream_waits_while_the_store_is_away() {
-    let mut pair = Pair::open(&[], 10).await;
+    let mut pair = Pair::open(&["--store-timeout", "1s"], 10).await;
     let expected = pair.undisturbed().await;
     let address = pair.replicas[0].address;
     let mut stream = StreamClient::open_in_time(address, pair.id, "").await;

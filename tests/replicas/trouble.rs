@@ -68,7 +68,7 @@ async fn haproxy_sends_a_replica_that_is_about_to_end_the_frames_of_its_sessions
 #[tokio::test]
 #[ignore = "needs redis and haproxy"]
 async fn behind_haproxy_a_store_that_is_away_is_told_by_problem_documents() {
-    let mut pair = Pair::open(&["--store-timeout", "300ms"], 4).await;
+    let mut pair = Pair::open(&["--store-timeout", "2s"], 4).await;
     let front = haproxy(&pair.replicas.each_ref().map(|replica| replica.address));
     let url = |path: &str| format!("http://{}/sessions{path}", front.address);
     let post = async |number: usize| {

@@ -63,8 +63,13 @@ impl Replica {
             "--client-requests",
             "200",
         ]);
-        if !flags.iter().any(|flag| flag == "--shutdown-delay") {
+        let has = |name: &str| flags.iter().any(|flag| flag == name);
+        if !has("--shutdown-delay") {
             command.args(["--shutdown-delay", "0s"]);
+        }
+        // A store on a slow disk is waited for.
+        if has("--store") && !has("--store-timeout") {
+            command.args(["--store-timeout", "5s"]);
         }
         command.args(flags);
         let mut process = Process::start(&mut command);
