@@ -4,6 +4,7 @@ use crate::application::{TestApplication, expect, expect_problem};
 use crate::helpers::heavy;
 use crate::pictures;
 use crate::requests::forms::form;
+use bagtrack_testing::within::within;
 use reqwest::{Response, StatusCode};
 use serde_json::Value;
 use std::time::Duration;
@@ -142,20 +143,31 @@ async fn the_processor_time_of_all_frames_together_is_bounded() {
 
 #[tokio::test]
 async fn the_last_frame_has_to_be_tracked_in_the_time_of_one_request() {
-    // Each frame takes some thousandths of that.
+    // Each frame takes some hundredths of that.
     let app = TestApplication::start_with(|config| {
         config.limits.max_request_cpu = Duration::from_secs(600);
         config.work_timeout = Duration::from_secs(1);
-        config.max_frames = 1500;
+        config.max_frames = 2 * heavy::FRAMES;
     });
     let app = app.await;
-    let id = app.open().await;
-    let request = heavy::post(&app, &format!("/sessions/{id}"), 1500);
-    let request = request.header("accept", LINES);
-    let mut got = lines(request.send().await.unwrap()).await;
+    let begun = async {
+        loop {
+            let session = heavy::open(&app).await;
+            let request = heavy::post(&app, &session, 2 * heavy::FRAMES);
+            let answer = request.header("accept", LINES).send().await.unwrap();
+            // On a busy machine the first frame may take that time, too.
+            if answer.status() == StatusCode::OK {
+                break (session, answer);
+            }
+            expect_problem(answer, "work-timeout").await;
+        }
+    };
+    let (session, answer) = within(begun, "a frame is tracked in time").await;
+    let mut got = lines(answer).await;
     let last = got.pop().unwrap();
     assert_eq!(last["type"], "/docs/problems#work-timeout", "{last}");
     // The frame at work may have ended without its line.
-    let tracked = app.frames_of(&id).await - 1;
+    let view = expect(app.get(&session).await, StatusCode::OK).await;
+    let tracked = view["frames"].as_u64().unwrap() - 1;
     assert!((0..=1).contains(&(tracked - got.len() as u64)), "{tracked}");
 }
