@@ -2,6 +2,7 @@
 
 use super::error::{MAX_CPU, MAX_MEMORY, VideoError};
 use std::ffi::{OsStr, OsString};
+use std::io::{PipeReader, PipeWriter};
 use std::process::{Child, Command, Stdio};
 
 /// By how much lower its priority is: that of other slow work.
@@ -36,15 +37,27 @@ pub(super) enum Trust {
     Own,
 }
 
-/// Starts the program with this input, and pipes for what it says. It gets nothing of the environment, which may have
-/// secrets, but the path.
+/// The program, and the pipe for what it says.
+pub(super) struct Started {
+    pub(super) child: Child,
+    pub(super) said: PipeReader,
+    /// The end at which it says it. As long as this is here, the other one has no end.
+    pub(super) saying: PipeWriter,
+}
+
+/// Starts the program with this input, and pipes for its pictures and what it says. It gets nothing of the environment,
+/// which may have secrets, but the path.
 pub(super) fn start<A: AsRef<OsStr>>(
     launcher: &Launcher,
     program: &str,
     arguments: impl IntoIterator<Item = A>,
     input: Stdio,
     trust: Trust,
-) -> Result<Child, VideoError> {
+) -> Result<Started, VideoError> {
+    let not_started = |source| VideoError::NoProgram {
+        program: program.to_owned(),
+        source,
+    };
     let mut words = launcher.words.iter().map(OsString::as_os_str);
     let mut command = match words.next() {
         Some(first) => {
@@ -61,14 +74,16 @@ pub(super) fn start<A: AsRef<OsStr>>(
     // Ctrl-C goes to the whole group of the terminal. Whoever wants the pictures decides when this ends.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
-    let pipes = command.stdin(input).stdout(Stdio::piped());
-    let child = pipes.stderr(Stdio::piped()).spawn();
-    let child = child.map_err(|source| VideoError::NoProgram {
-        program: program.to_owned(),
-        source,
-    })?;
+    let (said, saying) = std::io::pipe().map_err(not_started)?;
+    let own = saying.try_clone().map_err(not_started)?;
+    let pipes = command.stdin(input).stdout(Stdio::piped()).stderr(saying);
+    let child = pipes.spawn().map_err(not_started)?;
     limit(&child, trust);
-    Ok(child)
+    Ok(Started {
+        child,
+        said,
+        saying: own,
+    })
 }
 
 /// Sets the limits. Where that fails the program has ended already.

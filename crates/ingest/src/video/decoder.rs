@@ -1,12 +1,12 @@
 //! A video being decoded: the process, and the threads that feed it and hear what it says.
 
-use super::child::{self, Launcher, Trust};
+use super::child::{self, Launcher, Started, Trust};
 use super::error::{Cost, VideoError};
 use super::output::{self, VideoPicture};
 use super::said::{Fault, Said};
 use super::sniff::VideoFormat;
 use bytes::Bytes;
-use std::io::{self, BufReader, Write};
+use std::io::{self, BufReader, PipeWriter, Write};
 use std::mem;
 use std::ops::Range;
 use std::path::Path;
@@ -70,6 +70,8 @@ pub struct VideoDecoder {
     running: Arc<Mutex<Running>>,
     pictures: BufReader<ChildStdout>,
     said: Said,
+    /// Where the program says it, until a picture is there.
+    saying: Option<PipeWriter>,
     hearing: Option<JoinHandle<()>>,
     /// Pictures that are shown before this are passed over, in seconds after the file's start time.
     from: Option<f64>,
@@ -136,16 +138,17 @@ impl VideoDecoder {
         limits: VideoLimits,
         strictness: Strictness,
     ) -> Result<Self, VideoError> {
-        let mut child = source.start(program, limits, strictness)?;
-        let piped = "the command says that it is a pipe";
-        let (stdout, stderr) = (
-            child.stdout.take().expect(piped),
-            child.stderr.take().expect(piped),
-        );
+        let Started {
+            mut child,
+            said: pipe,
+            saying,
+        } = source.start(program, limits, strictness)?;
+        let stdout = child.stdout.take();
+        let stdout = stdout.expect("the command says that it is a pipe");
         // The thread does not outlive the process.
         let said = Said::new(strictness == Strictness::AllButReferences);
         let heard = said.clone();
-        let hearing = thread::spawn(move || heard.hear(BufReader::new(stderr)));
+        let hearing = thread::spawn(move || heard.hear(BufReader::new(pipe)));
         Ok(Self {
             source: Some(source),
             limits,
@@ -157,6 +160,7 @@ impl VideoDecoder {
             })),
             pictures: BufReader::new(stdout),
             said,
+            saying: Some(saying),
             hearing: Some(hearing),
             from: None,
             read: 0,
@@ -241,8 +245,14 @@ impl VideoDecoder {
     fn read_picture(&mut self) -> Result<Option<VideoPicture>, VideoError> {
         let read = output::next_picture(&mut self.pictures, self.limits.max_bytes);
         let picture = read.map_err(|error| self.damaged(error.to_string()))?;
+        let saying = self.saying.take();
         if picture.is_none() {
+            drop(saying);
             return self.end();
+        }
+        // What was said before the first picture tells whether to begin anew, which is too late with the second one.
+        if let Some(saying) = saying {
+            self.said.catch_up(saying);
         }
         // Pictures after damage have unknown numbers.
         if let Some(fault) = self.said.fault() {
@@ -301,7 +311,7 @@ impl Source {
         program: &str,
         limits: VideoLimits,
         strictness: Strictness,
-    ) -> Result<Child, VideoError> {
+    ) -> Result<Started, VideoError> {
         let begin = |launcher: &Launcher, input: &[&str], stdin: Stdio| {
             let arguments = arguments(input, limits, strictness);
             let trust = match self {
@@ -342,15 +352,15 @@ impl Source {
         if let Some(file) = file {
             return begin(launcher, &input, file);
         }
-        let mut child = begin(launcher, &input, Stdio::piped())?;
-        let stdin = child.stdin.take();
+        let mut started = begin(launcher, &input, Stdio::piped())?;
+        let stdin = started.child.stdin.take();
         let mut stdin = stdin.expect("the command says that it is a pipe");
         let bytes = bytes.clone();
         // It does not outlive the process. A program that has seen enough closes its input.
         thread::spawn(move || {
             let _ = stdin.write_all(&bytes);
         });
-        Ok(child)
+        Ok(started)
     }
 }
 

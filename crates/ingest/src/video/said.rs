@@ -1,12 +1,15 @@
 //! What the decoder's program says, and the fault that it tells.
 
-use std::io::{BufRead, Read};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::io::{BufRead, Read, Write};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 /// Most characters that are told of a line.
 const MAX_SAID: usize = 200;
 /// Most bytes of a line that are held; the rest counts as a line of its own.
 const MAX_LINE: u64 = 4096;
+
+/// Comes behind all that the program has said so far, written by whoever waits until that is heard. No text has it.
+const MARK: u8 = 0;
 
 /// What is wrong with a video.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,7 +30,7 @@ pub(super) enum Fault {
 
 /// What the program says. Clones hear the same.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Said(Arc<Mutex<Heard>>);
+pub(super) struct Said(Arc<(Mutex<Heard>, Condvar)>);
 
 #[derive(Debug, Default)]
 struct Heard {
@@ -39,20 +42,41 @@ struct Heard {
     fault_at_end: Option<Fault>,
     /// Whether the last line was of a codec that may not be read.
     is_unlisted: bool,
+    /// Whether the mark was heard, or the program says nothing more.
+    is_caught_up: bool,
 }
 
 impl Said {
     /// Nothing yet. A picture that others are made from is told as missing, or not.
     pub(super) fn new(takes_missing_references: bool) -> Self {
-        Self(Arc::new(Mutex::new(Heard {
+        let heard = Heard {
             takes_missing_references,
             ..Heard::default()
-        })))
+        };
+        Self(Arc::new((Mutex::new(heard), Condvar::new())))
     }
 
     fn lock(&self) -> MutexGuard<'_, Heard> {
         // Nothing panics while it is held.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits until all is heard that the program has said so far, in this pipe. Its pictures come by another one, and
+    /// on a busy machine they are there before what was said earlier.
+    pub(super) fn catch_up(&self, mut pipe: impl Write) {
+        if pipe.write_all(&[MARK, b'\n']).is_ok() {
+            drop(pipe);
+            let caught_up = self
+                .0
+                .1
+                .wait_while(self.lock(), |heard| !heard.is_caught_up);
+            drop(caught_up);
+        }
+    }
+
+    fn note_caught_up(&self) {
+        self.lock().is_caught_up = true;
+        self.0.1.notify_all();
     }
 
     /// What is wrong with the pictures from here on, once the program has said it.
@@ -89,10 +113,18 @@ impl Said {
             .read_until(b'\n', &mut line)
             .is_ok_and(|count| count > 0)
         {
-            let text = String::from_utf8_lossy(&line);
-            self.lock().take(text.trim());
+            // The program may be within a line: the rest of it comes behind the mark.
+            if let Some(end) = line.iter().position(|&byte| byte == MARK) {
+                line.truncate(end);
+                self.note_caught_up();
+                if end < MAX_LINE as usize {
+                    continue;
+                }
+            }
+            self.lock().take(String::from_utf8_lossy(&line).trim());
             line.clear();
         }
+        self.note_caught_up();
     }
 }
 
@@ -196,6 +228,7 @@ fn fault(line: &str, was_unlisted: bool) -> Fault {
 mod tests {
     use super::*;
     use std::io::{self, BufReader};
+    use std::thread;
 
     /// The whole line was held: as many bytes as the program has time for.
     #[test]
@@ -205,6 +238,33 @@ mod tests {
         let used = allocation_counter::measure(|| said.hear(endless));
         assert!(used.bytes_max < 64 << 10, "{used:?}");
         assert_eq!(said.fault(), Some(Fault::Damage("x".repeat(MAX_SAID))));
+    }
+
+    /// On a busy machine a first picture was there before what had been said of the pictures before it.
+    #[test]
+    fn what_was_said_is_heard_before_a_picture_is_given() {
+        let (reference, sound) = (
+            "[h264 @ 0x1] Missing reference picture, default is 65596\n",
+            "[aac @ 0x1] channel element 3.4 is not allocated\n",
+        );
+        for (before, after, expected) in [
+            (reference, "", Some(Fault::Reference)),
+            // The program is within a line.
+            (&sound[..12], &sound[12..], None),
+        ] {
+            let said = Said::default();
+            let (pipe, mut saying) = io::pipe().unwrap();
+            saying.write_all(before.as_bytes()).unwrap();
+            let mut program = saying.try_clone().unwrap();
+            let heard = said.clone();
+            let hearing = thread::spawn(move || heard.hear(BufReader::new(pipe)));
+            said.catch_up(saying);
+            assert_eq!(said.fault(), expected);
+            program.write_all(after.as_bytes()).unwrap();
+            drop(program);
+            hearing.join().unwrap();
+            assert_eq!(said.fault_in_all(), expected);
+        }
     }
 
     #[test]
