@@ -18,8 +18,7 @@ export function scaled(box, to, from) {
  * @param {import("./js/bagtrack.js").StreamAnswer} answer
  * @param {import("./source.js").Picture} picture
  * @param {{width: number, height: number}} size Of the video.
- * @param {boolean} corrected
- * @returns {import("./objects.js").Row} */
+ * @param {boolean} corrected */
 export function rowOf({ box, score, status }, { frame, time, image }, size, corrected) {
   return { frame, time: Number(time.toFixed(3)), box: scaled(box, size, image), score, status, corrected };
 }
@@ -28,8 +27,7 @@ export function rowOf({ box, score, status }, { frame, time, image }, size, corr
  * @param {import("./run.js").Run} run
  * @param {number} frame
  * @param {{width: number, height: number}} image
- * @param {import("./objects.js").FollowedObject} [chosen] The one that stands out; all of them where there is none.
- * @returns {import("./stage.js").Shown[]} */
+ * @param {import("./objects.js").FollowedObject} [chosen] The one that stands out; all of them where there is none. */
 export function shownIn({ objects, source }, frame, image, chosen) {
   const isNamed = objects.length > 1;
   return objects.flatMap((object) => {

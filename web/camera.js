@@ -46,8 +46,7 @@ export class Camera {
     next();
   }
 
-  /** What the camera sees now.
-   * @returns {Promise<Picture>} */
+  /** What the camera sees now. */
   async first() {
     this.isShown = false;
     this.firstTime = this.video.currentTime;

@@ -27,8 +27,7 @@ const SETTLES_AFTER = 3;
 
 /** @param {HTMLCanvasElement} image
  * @param {number} frame
- * @param {number} time
- * @returns {Promise<Picture>} */
+ * @param {number} time */
 const pictureOf = async (image, frame, time) => ({ image, blob: await encoded(image), time, frame });
 
 /** @implements {Source} */
@@ -108,8 +107,7 @@ export class VideoFile {
   /** Takes the frame that is shown as the one before all others.
    * @param {number} frame
    * @param {number} time
-   * @param {VideoFrameCallbackMetadata | undefined} shown
-   * @returns {Promise<Picture>} */
+   * @param {VideoFrameCallbackMetadata | undefined} shown */
   begin(frame, time, shown) {
     this.last = { frame, time, shown: shown?.presentedFrames };
     this.lastImage = drawFrame(this.video);
@@ -118,8 +116,7 @@ export class VideoFile {
 
   /** Any frame, by an element of its own: the file plays on meanwhile.
    * @param {number} frame
-   * @param {number} time
-   * @returns {Promise<Picture>} */
+   * @param {number} time */
   at(frame, time) {
     const looked = this.looked.then(async () => {
       this.reader ??= await openPlayed(this.file, this.place);

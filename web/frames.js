@@ -51,8 +51,7 @@ export class Frames {
   }
 
   /** Its picture; nothing where it is not to be had.
-   * @param {number} frame
-   * @returns {Promise<Picture | undefined>} */
+   * @param {number} frame */
   async at(frame) {
     const [time, blob] = [this.times.get(frame), this.blobs.get(frame)];
     if (time === undefined) return undefined;
@@ -61,8 +60,7 @@ export class Frames {
   }
 
   /** The one before a frame: one that was tracked, or one of the source.
-   * @param {number} frame
-   * @returns {Promise<Picture | undefined>} */
+   * @param {number} frame */
   async before(frame) {
     const { numbers, source } = this;
     const known = numbers.filter((number) => number < frame).pop();

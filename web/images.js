@@ -89,7 +89,7 @@ export async function openImages(files, names) {
   if (!names) images.sort((one, other) => order.compare(pathOf(one), pathOf(other)));
   if (images.length === 0) throw new DOMException("", "NotSupportedError");
   const [rare, others] = [true, false].map((isRare) => images.filter(({ name }) => RARE.test(name) === isRare));
-  const isLeftOut = others.length > 0 && rare.length > 0 && !(await createImageBitmap(rare[0]).catch(() => undefined));
+  const isLeftOut = !names && others[0] && rare[0] && !(await createImageBitmap(rare[0]).catch(() => undefined));
   if (isLeftOut) images = others;
   const folder = pathOf(images[0]).split("/").slice(0, -1).pop();
   /** @type {{width: number, height: number} | undefined} */

@@ -35,8 +35,7 @@ const PATIENCE = 1000;
 /** @type {Promise<IDBDatabase> | undefined} */
 let database;
 
-/** What runs are kept in. The browser may remove it: then it is another one.
- * @returns {Promise<IDBDatabase>} */
+/** What runs are kept in. The browser may remove it: then it is another one. */
 export function opened() {
   database ??= new Promise((resolve, reject) => {
     const request = indexedDB.open(NAME, 1);
@@ -57,7 +56,6 @@ export function opened() {
  * @template T
  * @param {IDBTransactionMode} mode
  * @param {(store: IDBObjectStore) => IDBRequest<T>} run The last one of its requests is answered.
- * @returns {Promise<T>}
  */
 async function within(mode, run) {
   const transaction = (await opened()).transaction(STORE, mode);
@@ -111,8 +109,7 @@ export const forget = (id) =>
     return store.delete(["work", id]);
   });
 
-/** The entries that no tab has open, newest first. Those that are too many or too old are forgotten.
- * @returns {Promise<Kept[]>} */
+/** The entries that no tab has open, newest first. Those that are too many or too old are forgotten. */
 export async function freeWorks() {
   await moveOld();
   /** @type {Kept[]} */

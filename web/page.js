@@ -134,8 +134,9 @@ export class Page {
     this.repaint();
     this.changed();
     const { isGone, source } = this.run ?? {};
+    const name = source?.files?.[1] ? "the images" : source?.name;
     if (this.canGoOn) this.fail(error, () => this.player.goOn(), GO_ON);
-    else this.fail(error, undefined, ` Choose ${isGone ? source?.name : "the video or the camera"} again.`);
+    else this.fail(error, undefined, ` Choose ${isGone ? name : "the video or the camera"} again.`);
   }
 
   reset() {
@@ -248,7 +249,7 @@ export class Page {
       this.leave();
       return this.repaint();
     }
-    const picture = await run.frames.at(nearest);
+    const picture = await run.frames.at(nearest).catch((error) => void this.fail(error));
     if (!picture || wanted !== this.view || run !== this.run) return;
     this.viewed = picture;
     this.show(picture);

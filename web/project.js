@@ -143,8 +143,7 @@ function unlike({ name, size, count = Infinity }, { video, objects }) {
 }
 
 /** @param {import("./source.js").Source} source
- * @param {Project} project
- * @returns {import("./source.js").Source} */
+ * @param {Project} project */
 function fitting(source, project) {
   const fault = unlike(source, project);
   if (!fault) return source;
@@ -166,20 +165,24 @@ export async function take(keeping, files) {
   return true;
 }
 
-/** Takes the video of a project; opens another one for itself. One that is gone has its name.
+/** Takes the video of a project; opens another one for itself. One that is gone may have another name.
  * @param {Keeping} keeping
  * @param {Run} run
  * @param {File[]} files */
 async function takeVideo(keeping, run, files) {
   const project = projectOf(run);
   const states = statesOf(run);
-  const [{ id }, { isAbsent, name }] = [keeping, run.source];
+  const [{ id }, { isAbsent, name, files: [gone] = [] }] = [keeping, run.source];
   const open = async () => {
     const source = await openFiles(files);
     return isAbsent && source.name === name ? fitting(source, project) : source;
   };
-  const resume = async (/** @type {Run} */ opened) =>
-    (isAbsent || opened.source.name === name) && !unlike(opened.source, project) && keeping.resume(opened, project, states, id);
+  const resume = async (/** @type {Run} */ opened) => {
+    const [{ source }, [file] = []] = [opened, opened.source.files];
+    const isRenamed = file?.size === gone?.size && file?.lastModified === gone?.lastModified;
+    const isSame = isAbsent || isRenamed || source.name === name;
+    return isSame && !unlike(source, project) && keeping.resume(opened, project, states, id);
+  };
   await keeping.page.opening.choose(open, resume);
 }
 

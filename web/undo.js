@@ -25,8 +25,7 @@ export class Undoing {
 
   /** What brings an object back to how it is now.
    * @param {Run} run
-   * @param {FollowedObject | undefined} object Nothing for one that is added.
-   * @returns {Step} */
+   * @param {FollowedObject | undefined} object Nothing for one that is added. */
   before(run, object) {
     const { rows, saves = [], number = run.count, follower } = object ?? {};
     return { number, rows: rows && new Map(rows), saves: [...saves], last: run.lastFrame, follower };

@@ -175,12 +175,12 @@ def file_that_is_gone(checks):
 
 
 def file_changed_after_a_stop(checks):
-    """A file that was changed after a stop is to be chosen again before one goes on. Another file of its size is a video
-    of its own."""
+    """A file that was changed or renamed after a stop is to be chosen again before one goes on. Another file of its size is
+    a video of its own."""
     whole = checks.files.file("clip.mp4", 30, H264).read_bytes()
-    path, other = (checks.files.folder / name for name in ("mine.mp4", "other.mp4"))
+    path, other, renamed = (checks.files.folder / name for name in ("mine.mp4", "other.mp4", "renamed.mp4"))
     other.write_bytes(whole)
-    for chosen in (path, other):
+    for chosen in (path, renamed, other):
         path.write_bytes(whole)
         page = checks.page(where="here")
         slow(page)
@@ -189,7 +189,10 @@ def file_changed_after_a_stop(checks):
         frames(page, 20)
         page.locator("#stop").click()
         before = kept_rows(page)
-        os.utime(path, (1, 1))
+        if chosen == renamed:
+            path.rename(renamed)
+        else:
+            os.utime(path, (1, 1))
         page.locator("#resume").click()
         said(page, "Choose mine.mp4 again.")
         assert page.locator("#resume").is_hidden() and rows(page) == before
@@ -197,7 +200,7 @@ def file_changed_after_a_stop(checks):
         if chosen == other:
             said(page, DRAW)
         else:
-            said(page, f"mine.mp4 is here again, with {len(before)} frames.")
+            said(page, f"{chosen.name} is here again, with {len(before)} frames.")
             page.locator("#pause").click()
             to_the_end(page)
             assert len(rows(page)) == FRAMES

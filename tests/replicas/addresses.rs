@@ -4,6 +4,7 @@ use crate::clip::Clip;
 use crate::pair::json;
 use crate::processes::{Process, ask_redis, free_port, redis_server};
 use crate::replica::Replica;
+use bagtrack_testing::within::within;
 use reqwest::{Client, StatusCode};
 use std::process::Command;
 use tempfile::TempDir;
@@ -23,7 +24,8 @@ async fn replicas_share_sessions(environment: &[(&str, &str)], store: &str) {
     let (replicas, clip, client) = ([replica(), replica()], Clip::of(0, FRAMES), Client::new());
     for replica in &replicas {
         // On a busy machine the store may be found late.
-        while replica.readiness().await != StatusCode::OK {}
+        let found = async { while replica.readiness().await != StatusCode::OK {} };
+        within(found, "the store is found").await;
     }
     for _ in 0..4 {
         let path = format!("/sessions/{}", Uuid::new_v4());

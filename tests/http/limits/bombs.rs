@@ -74,7 +74,7 @@ async fn work_past_its_deadline_stops_at_the_next_frame() {
     let request = heavy::post(&app, &session, 2 * heavy::FRAMES);
     expect_problem(request.send().await.unwrap(), "work-timeout").await;
     // The only worker is free again, as soon as the machine lets it take this one in time, and the others were left.
-    heavy::open(&app).await;
+    within(heavy::open(&app), "the worker is free").await;
     let decoded = decoded(&app).await;
     assert!(decoded < 2 * heavy::FRAMES, "{decoded} frames");
     let view = expect(app.get(&session).await, StatusCode::OK).await;

@@ -145,7 +145,7 @@ impl VideoDecoder {
         } = source.start(program, limits, strictness)?;
         let stdout = child.stdout.take();
         let stdout = stdout.expect("the command says that it is a pipe");
-        // The thread does not outlive the process.
+        // The thread outlives neither the process nor, before a first picture, this.
         let said = Said::new(strictness == Strictness::AllButReferences);
         let heard = said.clone();
         let hearing = thread::spawn(move || heard.hear(BufReader::new(pipe)));

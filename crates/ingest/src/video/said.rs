@@ -124,6 +124,7 @@ impl Said {
             self.lock().take(String::from_utf8_lossy(&line).trim());
             line.clear();
         }
+        self.lock().take(String::from_utf8_lossy(&line).trim());
         self.note_caught_up();
     }
 }
