@@ -6,9 +6,9 @@
 
 import { Delivery } from "./delivery.js";
 import { BEFORE, Gaps, SAME_PASSES } from "./gaps.js";
-import { Playback, SAME, UNREADABLE, areEqual, isEmpty, learnRate } from "./playback.js";
+import { Playback, SAME, areEqual, isEmpty, learnRate } from "./playback.js";
+import { GONE, isReadable } from "./problems.js";
 import { addVideo, drawFrame, encoded, loaded } from "./source.js";
-import { isReadable } from "./sources.js";
 
 /**
  * @typedef {import("./source.js").Picture} Picture
@@ -283,7 +283,7 @@ export async function openPlayed(file, place) {
     if (video.videoWidth === 0) throw new DOMException("", "NotSupportedError");
   } catch (error) {
     video.remove();
-    throw (await isReadable(file)) ? error : UNREADABLE;
+    throw (await isReadable(file)) ? error : GONE;
   }
   return new VideoFile(video, file, place);
 }

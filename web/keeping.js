@@ -5,7 +5,8 @@ import { get, input } from "./dom.js";
 import { again } from "./editing.js";
 import { MOST_BYTES, claim, forget, freeWorks, giveUp, opened } from "./kept.js";
 import { keepWork, keptFiles, keptWork, ownWork, setOwnWork } from "./kept.js";
-import { isReadable, openFiles } from "./sources.js";
+import { isReadable } from "./problems.js";
+import { openFiles } from "./sources.js";
 
 /**
  * @typedef {import("./kept.js").Kept} Kept

@@ -1,13 +1,11 @@
 // A video element that is gone to a time with, and what it shows then.
 
-import { isReadable } from "./sources.js";
+import { GONE, isReadable } from "./problems.js";
 
 /** Media times that differ by less are the same frame's, in seconds. */
 export const SAME = 0.001;
 /** How long a browser may take to show a frame that it went to, in milliseconds. */
 const SHOWN_WITHIN = 500;
-
-export const UNREADABLE = new DOMException("", "NotReadableError");
 
 export class Playback {
   /** @param {HTMLVideoElement} video
@@ -21,7 +19,7 @@ export class Playback {
     this.broken = new Promise((_, reject) => {
       this.fail = async (error) => {
         const isThere = await isReadable(file);
-        if (error || !isThere) reject(isThere ? error : UNREADABLE);
+        if (error || !isThere) reject(isThere ? error : GONE);
       };
     });
     this.broken.catch(() => undefined);

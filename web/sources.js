@@ -1,7 +1,7 @@
 // What one opens: buttons, files that are chosen, dropped or pasted, folders.
 
 import { button, get, input } from "./dom.js";
-import { UnplayableError } from "./problems.js";
+import { GONE, UnplayableError, isReadable } from "./problems.js";
 
 /** What opens sources is loaded when one is about to choose. */
 const modules = () =>
@@ -22,7 +22,7 @@ export async function openFiles(files, names) {
   }
   const [file, ...others] = videos.length > 0 ? videos : files;
   if (file.size === 0) throw new Error(`${file.name} is empty.`);
-  if (!(await isReadable(file))) throw new DOMException("", "NotReadableError");
+  if (!(await isReadable(file))) throw GONE;
   const source = await openVideo(file, get("stage")).catch((error) => {
     if (error.name !== "NotSupportedError") throw error;
     throw isNoVideo(file) ? new Error(`${file.name} is neither a video nor an image.`) : new UnplayableError(file);
@@ -30,10 +30,6 @@ export async function openFiles(files, names) {
   if (others.length > 0) source.note = ` Of ${others.length + 1} videos this is ${file.name}: open one at a time.`;
   return source;
 }
-
-/** Whether a file that was chosen can still be read.
- * @param {File} file */
-export const isReadable = (file) => file.slice(0, 1).arrayBuffer().then(() => true, () => false);
 
 /** Whether a file is by its kind of no use to a decoder. Some systems take an MPEG transport stream for a text.
  * @param {File} file */

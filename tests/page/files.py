@@ -145,6 +145,18 @@ def whole_file(checks, path, rate):
     page.context.close()
 
 
+def spoiled(checks, page, path, spoil):
+    """A file that is removed or changed after some frames is to be chosen again."""
+    choose_file(page, path)
+    drag(page, sent_box(checks.files.truth[0]))
+    frames(page, 8)
+    page.locator("#pause").click()
+    spoil()
+    page.locator("#pause").click()
+    said(page, f"The file cannot be read: it was moved, changed or removed. Choose {path.name} again.")
+    assert page.locator("#resume").is_hidden()
+
+
 def file_that_is_gone(checks):
     """A file that is removed or changed while it is tracked is no fault of the camera: what was tracked is kept, also
     over a reload, and goes on with the file."""
@@ -153,14 +165,7 @@ def file_that_is_gone(checks):
     for spoil in (lambda: path.unlink(), lambda: path.write_bytes(whole.read_bytes() + b"more")):
         path.write_bytes(whole.read_bytes())
         page = checks.page(where="here", allowed=("Failed to load",))
-        choose_file(page, path)
-        drag(page, sent_box(checks.files.truth[0]))
-        frames(page, 8)
-        page.locator("#pause").click()
-        spoil()
-        page.locator("#pause").click()
-        said(page, "The file cannot be read: it was moved, changed or removed. Choose gone.mp4 again.")
-        assert page.locator("#resume").is_hidden()
+        spoiled(checks, page, path, spoil)
         count = len(kept_rows(page))
         assert 8 <= count < FRAMES, count
         page.reload()
@@ -338,14 +343,7 @@ def file_gone_over_plain_http(checks):
     # Browsers look at the second in which it was changed last.
     for spoil in (path.unlink, lambda: os.utime(path, (1, 1))):
         page = checks.page(url=url, browser=browser, where="here", allowed=("Cross-Origin-Opener-Policy", "Failed to load"))
-        choose_file(page, path)
-        drag(page, sent_box(checks.files.truth[0]))
-        frames(page, 8)
-        page.locator("#pause").click()
-        spoil()
-        page.locator("#pause").click()
-        said(page, "The file cannot be read: it was moved, changed or removed. Choose gone.mp4 again.")
-        assert page.locator("#resume").is_hidden()
+        spoiled(checks, page, path, spoil)
         before = kept_rows(page)
         holed_file(checks, "gone.mp4")
         page.locator("#file").set_input_files(path)
