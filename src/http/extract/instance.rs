@@ -46,11 +46,11 @@ impl Instance {
 
     /// The document of a problem with the request, which is counted, and written to the log with its cause.
     pub fn report(&self, state: &AppState, problem: &Problem) -> ProblemDocument {
-        let (kind, cause) = (problem.kind().slug(), problem.cause());
-        let cause = cause.as_deref().unwrap_or("none");
+        let cause = problem.cause();
+        let (kind, cause) = (problem.kind().slug(), cause.as_deref());
         match problem.kind() {
-            Kind::Internal => tracing::error!(kind, cause, "problem"),
-            _ => tracing::info!(kind, cause, "problem"),
+            Kind::Internal => tracing::error!(problem = kind, cause, "refused"),
+            _ => tracing::info!(problem = kind, cause, "refused"),
         }
         self.count(state, problem)
     }

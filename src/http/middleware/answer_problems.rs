@@ -1,4 +1,5 @@
-//! Writes the document of a problem that a handler or a middleware answered with, and its line in the log.
+//! Writes the document of a problem that a handler or a middleware answered with, and counts it. The problem stays with
+//! the response, for the line of the request in the log.
 
 use crate::http::extract::instance::Instance;
 use crate::http::problems::problem::Problem;
@@ -19,16 +20,17 @@ pub async fn answer_problems(
 ) -> Response {
     let instance = Instance::of(&request);
     let mut response = next(request).await;
-    let Some(problem) = response.extensions_mut().remove::<Problem>() else {
+    let Some(problem) = response.extensions().get::<Problem>() else {
         return response;
     };
-    let document = Json(instance.report(state, &problem)).into_response();
+    let document = Json(instance.count(state, problem)).into_response();
+    let retry_after = problem.retry_seconds();
     *response.body_mut() = document.into_body();
     // The response's own headers stay: it may have some that the problem does not know, like `Allow`.
     let headers = response.headers_mut();
     headers.remove(CONTENT_LENGTH);
     headers.insert(CONTENT_TYPE, HeaderValue::from_static(PROBLEM));
-    if let Some(seconds) = problem.retry_seconds() {
+    if let Some(seconds) = retry_after {
         headers.insert(RETRY_AFTER, HeaderValue::from(seconds));
     }
     response

@@ -1,16 +1,20 @@
-//! One line in the log for each request, a span around what is logged on its behalf, and the trace that it belongs to.
+//! One line in the log for each request, with the problem that it was answered with; a span around what is logged on its
+//! behalf, and the trace that it belongs to.
 //!
 //! The span has the ids of the request and of its trace, the client's address, the name of its API key (never the key),
 //! the method, where some call has it, and the path: never bytes or boxes, no more of the path than any route has, and of a
-//! session's id only its beginning. Probes come every few seconds, so they are logged only where `debug` is asked for.
+//! session's id only its beginning. Probes come every few seconds, so they are logged where they are refused, or
+//! `debug` is asked for.
 
 use super::client_identity::note_address;
 use super::count_requests::method_label;
 use super::trace_context::{TRACEPARENT, TraceContext};
 use crate::http::extract::instance::Instance;
+use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::extract::Request;
 use axum::response::Response;
+use bagtrack_api::ProblemKind as Kind;
 use bagtrack_sessions::clock;
 use bagtrack_sessions::short_id;
 use percent_encoding::percent_decode_str;
@@ -47,9 +51,14 @@ pub async fn log_request(
     );
     #[cfg(feature = "otel")]
     super::exported_span::answered(&span, status);
-    span.in_scope(|| match is_probe {
-        true => tracing::debug!(status, ms, "answered"),
-        false => tracing::info!(status, ms, "answered"),
+    let problem = response.extensions_mut().remove::<Problem>();
+    let kind = problem.as_ref().map(Problem::kind);
+    let cause = problem.as_ref().and_then(Problem::cause);
+    let (problem, cause) = (kind.map(Kind::slug), cause.as_deref());
+    span.in_scope(|| match kind {
+        Some(Kind::Internal) => tracing::error!(status, ms, problem, cause, "answered"),
+        None if is_probe => tracing::debug!(status, ms, problem, cause, "answered"),
+        _ => tracing::info!(status, ms, problem, cause, "answered"),
     });
     response
 }

@@ -97,13 +97,13 @@ async fn frames_one_by_one_get_the_answers_of_frames_together() {
 
 #[tokio::test]
 async fn a_log_that_nobody_reads_stops_nothing_and_its_lost_lines_are_counted() {
-    const REQUESTS: u64 = 3000;
+    const REQUESTS: u64 = 6000;
     // A trusted proxy that asks for itself may ask as often as it likes.
     let flags = ["--log-format", "json", "--trusted-proxies", "127.0.0.1"];
     let service = Program::start(&flags, &[]);
 
-    // From here on the pipe is open and nobody reads it. Each of these requests has two lines in the log, together
-    // many times what the pipe and the service keep.
+    // From here on the pipe is open and nobody reads it. Each of these requests has a line in the log, together
+    // more than what the pipe and the service keep.
     let client = Client::new();
     let nowhere = service.url("/nowhere");
     let all = async {
@@ -140,7 +140,7 @@ async fn a_log_that_nobody_reads_stops_nothing_and_its_lost_lines_are_counted() 
         .filter(|line| line["span"]["path"] == "/nowhere");
     let written = of_requests.count() as u64;
     assert!(written > 1000 && dropped > 0, "{written} and {dropped}");
-    assert!(written + dropped >= 2 * REQUESTS, "{written} and {dropped}");
+    assert!(written + dropped >= REQUESTS, "{written} and {dropped}");
 }
 
 #[test]
