@@ -71,6 +71,9 @@ fn escaped(text: &str) -> String {
     for sign in text.chars() {
         match sign {
             '<' | '>' | '&' | '"' => escaped += &format!("&#{};", u32::from(sign)),
+            // XML has none of these, and a name of a file may.
+            other if other.is_control() => escaped.push('\u{fffd}'),
+            '\u{fffe}' | '\u{ffff}' => escaped.push('\u{fffd}'),
             other => escaped.push(other),
         }
     }

@@ -17,6 +17,7 @@ mod targets;
 mod video_file;
 mod video_info;
 
+use bagtrack_api::requests::Name;
 use bagtrack_cli::{BOXES, ModelFlag, ParamFlags, progress, read_boxes};
 use bagtrack_formats::{Columns, FileFormat, Format, Unfit};
 use bagtrack_sessions::{MAX_TARGETS, Selection};
@@ -46,7 +47,7 @@ pub struct Args {
     boxes: Vec<Rect>,
     /// What a target is called, where the format says it: once for each box, in their order. Without it they are Object 1,
     /// Object 2, …
-    #[arg(long = "name", value_name = "NAME")]
+    #[arg(long = "name", value_name = "NAME", value_parser = target_name)]
     names: Vec<String>,
     /// The first frame: its number, counted from 0, or its time in a video, like 12.5s, 1:30 or 0:01:30. The boxes hold
     /// there, and the frames before it are passed over.
@@ -188,6 +189,11 @@ fn name_of(path: &Path) -> String {
     let whole = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let name = whole.file_name().unwrap_or(whole.as_os_str());
     name.to_string_lossy().into_owned()
+}
+
+/// What a target is called, as the service takes it.
+fn target_name(text: &str) -> Result<String, String> {
+    Name::try_from(text.to_owned()).map(|name| name.0)
 }
 
 /// What each of `count` targets is called.

@@ -190,7 +190,7 @@ impl VideoInfo {
 /// What ffprobe says of the video at `path`, and of each of its packets or frames.
 fn ask(path: &Path, each: &str) -> io::Result<String> {
     let mut command = Command::new(FFPROBE);
-    command.args(["-v", "error", "-select_streams", "v:0", "-of", "csv"]);
+    command.args(["-v", "error", "-select_streams", "V:0", "-of", "csv"]);
     let entries =
         format!("format=format_name,start_time:stream=codec_name,avg_frame_rate,time_base:{each}");
     command.args(["-show_entries", &entries]).arg(path);

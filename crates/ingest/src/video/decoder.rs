@@ -6,6 +6,7 @@ use super::output::{self, VideoPicture};
 use super::said::{Fault, Said};
 use super::sniff::VideoFormat;
 use bytes::Bytes;
+use std::ffi::{OsStr, OsString};
 use std::io::{self, BufReader, PipeWriter, Write};
 use std::mem;
 use std::ops::Range;
@@ -46,7 +47,7 @@ enum Source {
     /// Bytes, by a program that this starts.
     Bytes(Launcher, Bytes, VideoFormat),
     /// A file of this machine, from a picture on that is shown within these seconds after its start time.
-    File(String, Option<Range<f64>>),
+    File(OsString, Option<Range<f64>>),
 }
 
 /// What the program is to take for damage.
@@ -127,7 +128,8 @@ impl VideoDecoder {
         from: Option<Range<f64>>,
         limits: VideoLimits,
     ) -> Result<Self, VideoError> {
-        let url = format!("file:{}", path.display());
+        let mut url = OsString::from("file:");
+        url.push(path);
         let source = Source::File(url, from);
         Self::start(source, program, limits, Strictness::All)
     }
@@ -312,7 +314,7 @@ impl Source {
         limits: VideoLimits,
         strictness: Strictness,
     ) -> Result<Started, VideoError> {
-        let begin = |launcher: &Launcher, input: &[&str], stdin: Stdio| {
+        let begin = |launcher: &Launcher, input: &[&OsStr], stdin: Stdio| {
             let arguments = arguments(input, limits, strictness);
             let trust = match self {
                 Self::Bytes(..) => Trust::Foreign,
@@ -323,12 +325,14 @@ impl Source {
         let (launcher, bytes, format) = match self {
             Self::Bytes(launcher, bytes, format) => (launcher, bytes, *format),
             Self::File(url, from) => {
-                let mut input = vec!["-protocol_whitelist", "file"];
                 let from = from.as_ref().map(|range| format!("{:.6}", range.start));
+                let mut input = vec!["-protocol_whitelist", "file"];
                 if let Some(seconds) = &from {
                     input.extend(["-ss", seconds]);
                 }
-                input.extend(["-i", url]);
+                input.push("-i");
+                let mut input: Vec<&OsStr> = input.into_iter().map(OsStr::new).collect();
+                input.push(url);
                 return begin(&Launcher::default(), &input, Stdio::null());
             }
         };
@@ -349,6 +353,7 @@ impl Source {
         let mut input = vec!["-protocol_whitelist", protocols];
         input.extend(["-format_whitelist", FORMATS, "-codec_whitelist", CODECS]);
         input.extend(source);
+        let input: Vec<&OsStr> = input.into_iter().map(OsStr::new).collect();
         if let Some(file) = file {
             return begin(launcher, &input, file);
         }
@@ -365,7 +370,7 @@ impl Source {
 }
 
 /// The program's arguments for this input.
-fn arguments(input: &[&str], limits: VideoLimits, strictness: Strictness) -> Vec<String> {
+fn arguments(input: &[&OsStr], limits: VideoLimits, strictness: Strictness) -> Vec<OsString> {
     let pixels = limits.max_pixels.saturating_add(PADDING).to_string();
     let count = (limits.max_pictures.min(MAX_PICTURES) + 1).to_string();
     let before = ["-hide_banner", "-nostdin", "-v", "error", "-threads", "1"];
@@ -373,9 +378,10 @@ fn arguments(input: &[&str], limits: VideoLimits, strictness: Strictness) -> Vec
         Strictness::All => &["-xerror", "-err_detect", "explode"][..],
         Strictness::AllButReferences => &["-xerror"],
     };
+    // Not a picture of the cover, which may stand before the first track.
     let chosen = [
         "-map",
-        "0:v:0",
+        "0:V:0",
         "-vsync",
         "passthrough",
         "-frames:v",
@@ -386,19 +392,19 @@ fn arguments(input: &[&str], limits: VideoLimits, strictness: Strictness) -> Vec
     let coded = [
         "-c:v", "mjpeg", "-q:v", "2", "-pix_fmt", "yuvj420p", "-threads", "1",
     ];
-    let arguments = [
-        &before[..],
-        detection,
-        &["-max_pixels", &pixels],
-        input,
-        &chosen,
+    let options = [&before[..], detection, &["-max_pixels", &pixels]].concat();
+    let output = [
+        &chosen[..],
         &["-vf", filters],
         // By default the encoder counts frames of a constant rate.
         &output::TIME_BASE,
         &coded,
         &output::FORMAT,
     ];
-    arguments.concat().into_iter().map(str::to_owned).collect()
+    let options = options.into_iter().map(OsString::from);
+    let output = output.concat().into_iter().map(OsString::from);
+    let input = input.iter().map(OsString::from);
+    options.chain(input).chain(output).collect()
 }
 
 /// Whether the system ended it, as it does after its processor time.

@@ -131,9 +131,11 @@ impl Said {
 
 impl Heard {
     fn take(&mut self, line: &str) {
-        // The cache says on every start that it cannot know the length of a pipe.
-        let is_noise = line.starts_with("[cache @") || line.contains("Last message repeated");
-        if is_noise || line.is_empty() || is_of_sound(line) {
+        // The cache says on every start that it cannot know the length of a pipe. What cameras and editors note in an APP
+        // segment is not of the picture.
+        let noise = ["Last message repeated", "unable to decode APP fields"];
+        let is_noise = noise.iter().any(|text| line.contains(text));
+        if is_noise || line.starts_with("[cache @") || line.is_empty() || is_of_sound(line) {
             return;
         }
         // It is said as soon as the index is looked for. The pictures that are there have their numbers.
@@ -288,6 +290,8 @@ mod tests {
             "[mp3float @ 0x1] Header missing",
         ];
         assert_eq!(fault(&sound), None);
+        let note = "[mjpeg @ 0x1] unable to decode APP fields: Invalid data found";
+        assert_eq!(fault(&[note]), None);
         let failed = "[mjpeg @ 0x1] get_buffer() failed";
         assert_eq!(fault(&[failed]), Some(Fault::Memory));
         let size = "[h264 @ 0x1] [IMGUTILS @ 0x2] Picture size 0x0 is invalid";
