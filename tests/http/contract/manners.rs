@@ -8,8 +8,7 @@ use serde_json::Value;
 
 #[tokio::test]
 async fn answers_end_with_a_newline() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     let answers = [
         app.create(pictures::png(0), &[("box", BOX)]).await,
         app.create(b"no image".to_vec(), &[("box", BOX)]).await,
@@ -36,8 +35,7 @@ fn digits(value: &Value) -> usize {
 
 #[tokio::test]
 async fn numbers_have_as_many_digits_as_they_mean() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     let mut most = [0, 0];
     for t in 1..=10 {
         let answer = app.post_numbered(&id, t, pictures::png(t as u32)).await;
@@ -51,10 +49,7 @@ async fn numbers_have_as_many_digits_as_they_mean() {
         most[1] = most[1].max(digits(&answer["score"]));
     }
     assert_eq!(most, [2, 3]);
-    let created = app
-        .create(pictures::png(0), &[("box", "20.00499,15,16.126,12")])
-        .await;
-    let created = expect(created, StatusCode::CREATED).await;
+    let created = app.opened(&[("box", "20.00499,15,16.126,12")]).await;
     let given = serde_json::json!({"x": 20.0, "y": 15.0, "width": 16.13, "height": 12.0});
     assert_eq!(created["box"], given);
 }

@@ -1,6 +1,6 @@
 //! How each problem is provoked: a request that would succeed, with one thing wrong.
 
-use crate::application::{BOX, TestApplication, behind_a_proxy, expect};
+use crate::application::{BOX, TestApplication, behind_a_proxy};
 use crate::helpers::heavy;
 use crate::helpers::raw::RawConnection;
 use crate::operation::metrics::readiness;
@@ -140,10 +140,8 @@ impl Attempt {
                 self.id = None;
             }
             "forbidden" => {
-                let path = format!("/sessions/{}/token", self.id.as_ref().unwrap());
-                let request = self.app.request(Method::POST, &path, &[]);
-                let token = expect(request.send().await.unwrap(), StatusCode::OK).await;
-                self.app.key = Some(token["token"].as_str().unwrap().to_owned());
+                let token = self.app.token(self.id.as_ref().unwrap()).await;
+                self.app.key = Some(token);
             }
             "session-expired" => {
                 self.app.clock.advance(Duration::from_secs(600));

@@ -28,7 +28,7 @@ async fn sixty_four_bombs_of_another_size_hold_no_worker() {
         let problem = expect_problem(refused, "frame-size-mismatch").await;
         assert_eq!(problem["index"], 0);
     }
-    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    app.track(&id, 1).await;
     // Decoding them took both workers half a minute.
     assert_eq!(decoded(&app).await, 3, "those that were taken");
     assert!(
@@ -50,8 +50,7 @@ async fn decoded(app: &TestApplication) -> usize {
 
 #[tokio::test]
 async fn the_size_of_the_last_frame_is_checked_before_the_first_is_decoded() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     let mut damaged = pictures::png(1);
     let middle = damaged.len() / 2;
     damaged[middle] ^= 0xFF;

@@ -28,7 +28,7 @@ async fn clients_that_never_read_lose_their_connections() {
     };
     let refused = join_all((0..6).map(|_| never_reads()));
     let other = async {
-        expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+        app.track(&id, 1).await;
     };
     let both = async { tokio::join!(refused, other) };
     within(both, "the connections end").await;
@@ -196,8 +196,7 @@ async fn a_request_names_exactly_one_host() {
 
 #[tokio::test]
 async fn what_stands_before_the_first_part_of_a_form_and_the_heads_of_parts_are_bounded() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     let path = format!("/sessions/{id}/frames");
     let lines = "Content-Type: multipart/form-data; boundary=b\r\nContent-Length: 8000000";
     let head = "--b\r\nContent-Disposition: form-data; name=\"frame\"\r\nX: ";

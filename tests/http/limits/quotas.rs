@@ -1,26 +1,16 @@
 //! What one client may have, and that others get their turn beside it.
 
-use crate::application::{
-    BOX, TestApplication, behind_a_proxy, expect, expect_detail, expect_problem,
-};
+use crate::application::{TestApplication, behind_a_proxy, expect, expect_detail, expect_problem};
 use crate::helpers::heavy;
 use crate::helpers::raw::RawConnection;
 use crate::pictures;
 use bagtrack::http::Secret;
 use bagtrack_testing::within::within;
-use reqwest::{Method, Response, StatusCode};
+use reqwest::{Method, StatusCode};
 use std::net::{IpAddr, SocketAddr};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 use tokio::task::JoinSet;
-
-async fn create_as(app: &TestApplication, client: &str) -> Response {
-    let request = app.request(Method::POST, "/sessions", &[("box", BOX)]);
-    let request = request
-        .header("x-forwarded-for", client)
-        .body(pictures::png(0));
-    request.send().await.unwrap()
-}
 
 #[tokio::test]
 async fn one_client_cannot_take_all_sessions() {
@@ -31,31 +21,31 @@ async fn one_client_cannot_take_all_sessions() {
     let app = app.await;
     let mut paths = Vec::new();
     for left in ["1", "0"] {
-        let created = create_as(&app, "198.51.100.1").await;
+        let created = app.create_as("198.51.100.1").await;
         let limit = created.headers()["ratelimit"].to_str().unwrap().to_owned();
         assert!(limit.contains(&format!("\"sessions\";r={left}")), "{limit}");
         paths.push(created.headers()["location"].to_str().unwrap().to_owned());
         expect(created, StatusCode::CREATED).await;
     }
-    let refused = create_as(&app, "198.51.100.1").await;
+    let refused = app.create_as("198.51.100.1").await;
     let policy = refused.headers()["ratelimit-policy"].to_str().unwrap();
     assert!(policy.contains("\"sessions\";q=2"), "{policy}");
     expect_detail(refused, "quota-exceeded", &["2 sessions"]).await;
-    expect(create_as(&app, "198.51.100.2").await, StatusCode::CREATED).await;
+    expect(app.create_as("198.51.100.2").await, StatusCode::CREATED).await;
     let deleted = app
         .request(Method::DELETE, &paths[0], &[])
         .send()
         .await
         .unwrap();
     assert_eq!(deleted.status(), StatusCode::NO_CONTENT);
-    expect(create_as(&app, "198.51.100.1").await, StatusCode::CREATED).await;
+    expect(app.create_as("198.51.100.1").await, StatusCode::CREATED).await;
 }
 
 #[tokio::test]
 async fn an_address_that_no_trusted_proxy_forwards_is_not_believed() {
     let app = TestApplication::start_with(|config| config.max_sessions = 4).await;
-    expect(create_as(&app, "198.51.100.1").await, StatusCode::CREATED).await;
-    expect_problem(create_as(&app, "198.51.100.2").await, "quota-exceeded").await;
+    expect(app.create_as("198.51.100.1").await, StatusCode::CREATED).await;
+    expect_problem(app.create_as("198.51.100.2").await, "quota-exceeded").await;
 }
 
 #[tokio::test]
@@ -132,7 +122,7 @@ async fn a_client_with_one_session_gets_its_turn_beside_one_with_forty() {
     }
     let sent = Instant::now();
     for t in 1..=20 {
-        expect(app.post_frame(&id, pictures::png(t)).await, StatusCode::OK).await;
+        app.track(&id, t).await;
     }
     let modest = sent.elapsed().as_micros() as u64 / 20;
     let greedy = WAITED.load(Ordering::Relaxed) / ANSWERED.load(Ordering::Relaxed);
@@ -148,7 +138,7 @@ async fn what_is_left_of_the_frames_comes_back_and_is_told_by_every_call() {
     });
     let app = app.await;
     let id = app.open().await;
-    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    app.track(&id, 1).await;
     // Asking takes no frame.
     let full = async {
         loop {
@@ -221,7 +211,7 @@ async fn a_client_that_asks_too_often_is_refused_and_its_probes_its_frames_and_o
         for probe in ["/healthz", "/readyz"] {
             assert_eq!(app.get(probe).await.status(), StatusCode::OK, "{probe}");
         }
-        expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+        app.track(&id, 1).await;
         let mut other = RawConnection::open_from(IpAddr::from([127, 0, 0, 9]), app.address).await;
         other.send(ASK).await;
         let answer = other.read_answer().await;

@@ -44,9 +44,7 @@ async fn open_dear(app: &TestApplication, client: &str) -> Response {
 }
 
 async fn open(app: &TestApplication, client: &str) -> String {
-    let request = request_as(app, client, "/sessions", &[("box", BOX)]);
-    let opened = request.body(pictures::png(0)).send().await.unwrap();
-    let opened = expect(opened, StatusCode::CREATED).await;
+    let opened = expect(app.create_as(client).await, StatusCode::CREATED).await;
     opened["id"].as_str().unwrap().to_owned()
 }
 
@@ -63,7 +61,7 @@ async fn one_client_with_costly_sessions_leaves_memory_for_those_of_others() {
     assert!(opened >= 2, "{opened}");
     expect(open_dear(&app, MODEST).await, StatusCode::CREATED).await;
     let id = open(&app, MODEST).await;
-    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    app.track(&id, 1).await;
 }
 
 /// How many dear sessions a client gets until it is refused, and what it is told then.
@@ -102,7 +100,7 @@ async fn the_share_of_sessions_shrinks_with_each_client_and_the_next_one_still_o
     }
     expect(open_dear(&app, MODEST).await, StatusCode::CREATED).await;
     let id = open(&app, MODEST).await;
-    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    app.track(&id, 1).await;
 }
 
 /// Bytes of a body that is held, and of the memory for all of them.
@@ -187,11 +185,7 @@ async fn beside_a_page(change: fn(&mut Config)) -> (TestApplication, [String; 2]
     });
     let app = app.await;
     let sessions = [app.open().await, app.open().await];
-    let path = format!("/sessions/{}/token", sessions[0]);
-    let made = app.request(Method::POST, &path, &[]).send().await.unwrap();
-    let made = expect(made, StatusCode::OK).await;
-    let token = made["token"].as_str().unwrap();
-    let line = format!("Authorization: Bearer {token}");
+    let line = format!("Authorization: Bearer {}", app.token(&sessions[0]).await);
     (app, sessions, line)
 }
 
@@ -235,8 +229,7 @@ async fn stalled_requests_of_a_page_leave_places_to_the_other_sessions_of_its_ke
         }
     }
     assert_eq!(stalled.len(), 2);
-    let answer = app.post_frame(&sessions[1], pictures::png(1)).await;
-    expect(answer, StatusCode::OK).await;
+    app.track(&sessions[1], 1).await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -370,7 +363,7 @@ async fn the_share_of_streams_shrinks_and_the_next_client_opens_one() {
     }
     assert_eq!(shares, [8, 8, 8, 4, 2]);
     let id = open(&app, MODEST).await;
-    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    app.track(&id, 1).await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -1,6 +1,6 @@
 //! What is counted beside plain answers: lines, messages, connections that no handler sees; and readiness.
 
-use crate::application::{TestApplication, expect, expect_detail};
+use crate::application::{TestApplication, bound_bodies, expect, expect_detail};
 use crate::helpers::raw::RawConnection;
 use crate::operation::metrics::{metrics, readiness, value};
 use crate::pictures;
@@ -14,8 +14,7 @@ use std::time::Duration;
 
 #[tokio::test]
 async fn lines_and_messages_count_as_sent() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     let sent = async || value(&metrics(&app).await, "bagtrack_sent_bytes_total", &[]);
     let frames = form((1..=60).map(|t| pictures::png(t % 20)));
     // Its own answer is the only other one between two of these.
@@ -114,12 +113,7 @@ fn expect_refusal(answer: &str) {
 
 #[tokio::test]
 async fn readiness_ends_when_the_memory_of_bodies_is_used_up() {
-    let app = TestApplication::start_with(|config| {
-        config.max_body_bytes = 100_000;
-        config.max_upload_bytes = 100_000;
-        config.limits.client_upload_bytes = Some(100_000);
-    });
-    let app = app.await;
+    let app = TestApplication::start_with(|config| bound_bodies(config, 100_000, 100_000)).await;
     let id = app.open().await;
     let target = format!("/sessions/{id}/frames");
     let mut held = RawConnection::hold(app.address, "POST", &target, 99_000).await;

@@ -48,10 +48,9 @@ pub fn value(text: &str, name: &str, labels: &[&str]) -> f64 {
 
 #[tokio::test]
 async fn requests_frames_problems_and_sizes_are_counted() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     for t in 1..4 {
-        expect(app.post_frame(&id, pictures::png(t)).await, StatusCode::OK).await;
+        app.track(&id, t).await;
     }
     expect_problem(app.post_frame(&id, vec![1]).await, "unsupported-image").await;
     app.get("/nowhere").await;

@@ -94,8 +94,7 @@ async fn frames_before_a_bad_one_count_and_its_problem_is_the_last_line() {
 
 #[tokio::test]
 async fn a_refused_first_frame_is_the_answer_to_the_request() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     let other_size = post(&app, &id, &[], vec![pictures::png_of(64, 48)]).await;
     expect_problem(other_size, "frame-size-mismatch").await;
     let early = post(&app, &id, &[("frame", "40")], frames(1..=2)).await;

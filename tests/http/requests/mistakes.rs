@@ -10,8 +10,7 @@ use serde_json::{Value, json};
 
 #[tokio::test]
 async fn a_file_under_another_name_is_told_to_be_called_frame() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     for path in ["/sessions".to_owned(), format!("/sessions/{id}/frames")] {
         for name in ["image", "file", "images[]", "picture", "bild"] {
             let part = Part::bytes(pictures::png(0)).file_name("first.png");
@@ -46,8 +45,7 @@ const AVIF: &[u8] = b"\0\0\0\x20ftypavif\0\0\0\0avifmif1miafMA1B\0\0\0\xf2meta\0
 
 #[tokio::test]
 async fn heic_and_avif_are_named_with_the_cure_at_the_opening_and_as_a_frame() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     for (file, texts) in [
         (HEIC, ["HEIC", "Most Compatible", "JPEG"]),
         (AVIF, ["AVIF", "not read", "JPEG"]),
@@ -70,8 +68,7 @@ async fn heic_and_avif_are_named_with_the_cure_at_the_opening_and_as_a_frame() {
 /// Three boxes for 96 x 72: two corners, fractions, and a negative side.
 #[tokio::test]
 async fn a_box_in_other_units_is_refused_with_the_box_that_is_meant() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     assert_eq!((pictures::WIDTH, pictures::HEIGHT), (96, 72));
     for (given, texts) in [
         ("70,50,90,65", ["x1,y1,x2,y2", "`box=70,50,20,15`"]),
@@ -107,8 +104,7 @@ async fn a_box_that_reaches_far_outside_is_tracked_with_a_warning() {
             "{warning}"
         );
     };
-    let created = app.create(pictures::png(0), &far).await;
-    let created = expect(created, StatusCode::CREATED).await;
+    let created = app.opened(&far).await;
     has_warning(&created);
     let id = created["id"].as_str().unwrap();
     let corrected = app.put_target(id, pictures::png(1), &far[..1]).await;
@@ -121,16 +117,13 @@ async fn a_box_that_reaches_far_outside_is_tracked_with_a_warning() {
     stream.send(pictures::png(2)).await;
     has_warning(&stream.message().await);
     // A box on the frame has none, nor has a plain answer.
-    let plain = app.create(pictures::png(0), &[("box", BOX)]).await;
-    let plain = expect(plain, StatusCode::CREATED).await;
+    let plain = app.opened(&[("box", BOX)]).await;
     assert_eq!(plain.get("warnings"), None, "{plain}");
-    let answer = app.post_frame(id, pictures::png(3)).await;
-    let answer = expect(answer, StatusCode::OK).await;
+    let answer = app.track(id, 3).await;
     assert_eq!(answer.get("warnings"), None, "{answer}");
     // It may be two corners, and may be a large box.
     let doubtful = [("box", "40,30,58,44")];
-    let created = app.create(pictures::png(0), &doubtful).await;
-    let created = expect(created, StatusCode::CREATED).await;
+    let created = app.opened(&doubtful).await;
     let warning = created["warnings"][0].as_str().unwrap();
     assert!(warning.contains("`box=40,30,18,14`"), "{warning}");
 }

@@ -1,6 +1,6 @@
 //! What bodies hold while they arrive: memory as far as they have come, and no place in the queue.
 
-use crate::application::{TestApplication, behind_a_proxy, expect, expect_problem};
+use crate::application::{TestApplication, behind_a_proxy, bound_bodies, expect, expect_problem};
 use crate::helpers::raw::RawConnection;
 use crate::limits::connections::expect_body_timeouts;
 use crate::pictures;
@@ -32,7 +32,7 @@ async fn bodies_that_are_announced_and_never_sent_close_the_service_to_nobody() 
             held.push(open.await);
         }
     }
-    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    app.track(&id, 1).await;
     drop(held);
 }
 
@@ -63,12 +63,7 @@ async fn the_bodies_of_all_requests_together_are_bounded_by_what_has_arrived() {
 
 #[tokio::test]
 async fn json_counts_with_the_copies_that_parsing_makes() {
-    let app = TestApplication::start_with(|config| {
-        config.max_body_bytes = 100_000;
-        config.max_upload_bytes = 150_000;
-        config.limits.client_upload_bytes = Some(150_000);
-    });
-    let app = app.await;
+    let app = TestApplication::start_with(|config| bound_bodies(config, 100_000, 150_000)).await;
     let id = app.open().await;
     let mut padded = pictures::png(1);
     padded.resize(45_000, 0);
@@ -140,8 +135,7 @@ async fn the_rest_of_a_refused_body_has_the_same_least_rate() {
 
 #[tokio::test]
 async fn a_length_over_the_limit_is_refused_before_the_body_is_sent() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     let mut connection = RawConnection::open(app.address).await;
     let head = format!(
         "POST /sessions/{id}/frames HTTP/1.1\r\nHost: localhost\r\nContent-Length: 629145600\r\n\r\n"

@@ -1,13 +1,13 @@
 //! Clients with tokens of an identity provider, beside those with API keys.
 
-use crate::application::{TestApplication, expect, expect_detail, expect_problem};
+use crate::application::{TestApplication, expect_detail, expect_problem};
 use crate::pictures;
 use crate::program::Program;
 use crate::stream_client::StreamClient;
 use crate::streams::stream::problem_slug;
 use bagtrack::http::{Config, Secret};
 use bagtrack_testing::issuer::{IssuerKey, key_set};
-use reqwest::{Client, Method, StatusCode};
+use reqwest::{Client, StatusCode};
 use rustix::process::Signal;
 use serde_json::json;
 use std::path::Path;
@@ -54,10 +54,10 @@ async fn with_keys_in(file: &Path) -> TestApplication {
 async fn a_session_belongs_to_the_subject_of_the_token_that_opened_it() {
     let (_folder, key, mut app) = signed_in().await;
     let id = app.open().await;
-    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    app.track(&id, 1).await;
     // A later token of hers is as good.
     app.key = Some(token(&key, "ann"));
-    expect(app.post_frame(&id, pictures::png(2)).await, StatusCode::OK).await;
+    app.track(&id, 2).await;
     for other in [token(&key, "ben"), KEY.to_owned()] {
         app.key = Some(other);
         expect_problem(app.get_session(&id).await, "session-not-found").await;
@@ -73,8 +73,7 @@ async fn a_session_belongs_to_the_subject_of_the_token_that_opened_it() {
 async fn a_token_that_has_ended_is_told_so_and_ends_its_stream() {
     let (_folder, _key, mut app) = signed_in().await;
     let id = app.open().await;
-    let made = app.request(Method::POST, &format!("/sessions/{id}/token"), &[]);
-    let made = expect(made.send().await.unwrap(), StatusCode::OK).await;
+    let token = app.token(&id).await;
     let bearer = format!("Bearer {}", app.key.as_deref().unwrap());
     let headers = [("authorization", bearer.as_str())];
     let opened = StreamClient::try_open(app.address, &id, "", &headers).await;
@@ -98,8 +97,8 @@ async fn a_token_that_has_ended_is_told_so_and_ends_its_stream() {
     assert_eq!(problem_slug(&stream.message().await), "unauthorized");
     assert_eq!(stream.close_code().await, 4401);
     // What she gave a page is good for its own time.
-    app.key = Some(made["token"].as_str().unwrap().to_owned());
-    expect(app.post_frame(&id, pictures::png(3)).await, StatusCode::OK).await;
+    app.key = Some(token);
+    app.track(&id, 3).await;
 }
 
 #[tokio::test]

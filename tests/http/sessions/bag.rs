@@ -1,6 +1,6 @@
 //! The bag as a picture.
 
-use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::application::{BOX, TestApplication, bound_bodies, expect_problem};
 use crate::pictures;
 use image::RgbImage;
 use reqwest::StatusCode;
@@ -27,12 +27,11 @@ async fn the_sheet_has_a_row_for_each_subspace_and_shows_the_target() {
     let app = TestApplication::start().await;
     let params = r#"{"patch_width": 16, "patch_height": 16, "update_every": 2, "basis_dim": 2}"#;
     let query = [("box", BOX), ("preset", "paper"), ("parameters", params)];
-    let created = app.create(pictures::png(0), &query).await;
-    let created = expect(created, StatusCode::CREATED).await;
+    let created = app.opened(&query).await;
     let id = created["id"].as_str().unwrap();
     let before = sheet(&app, id).await;
     for t in 1..=4 {
-        expect(app.post_frame(id, pictures::png(t)).await, StatusCode::OK).await;
+        app.track(id, t).await;
     }
     let after = sheet(&app, id).await;
     // Two entries more, each 64 pixels high with a gap of 4.
@@ -57,8 +56,7 @@ async fn the_sheet_has_a_row_for_each_subspace_and_shows_the_target() {
 
 #[tokio::test]
 async fn gradient_features_have_two_pictures_a_vector() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     let sheet = sheet(&app, &id).await;
     let step = sheet.height() - 4;
     assert!(sheet.width() > 2 * step, "{:?}", sheet.dimensions());
@@ -66,14 +64,9 @@ async fn gradient_features_have_two_pictures_a_vector() {
 
 #[tokio::test]
 async fn the_sheet_is_charged_to_the_memory_of_bodies() {
-    let app = TestApplication::start_with(|config| {
-        config.max_body_bytes = 30_000;
-        config.max_upload_bytes = 40_000;
-        config.limits.client_upload_bytes = Some(40_000);
-    });
-    let app = app.await;
+    let app = TestApplication::start_with(|config| bound_bodies(config, 30_000, 40_000)).await;
     let id = app.open().await;
     let refused = app.get(&format!("/sessions/{id}/bag.png")).await;
     expect_problem(refused, "quota-exceeded").await;
-    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    app.track(&id, 1).await;
 }

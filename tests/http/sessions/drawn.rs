@@ -76,8 +76,7 @@ async fn the_picture_has_the_box_and_the_particles_and_the_header_the_answer() {
 
 #[tokio::test]
 async fn draw_in_the_query_asks_for_a_picture_too() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     for draw in ["", "true"] {
         let request = app.frames_request(&id, &[("draw", draw)]);
         let response = request.body(pictures::png(1)).send().await.unwrap();
@@ -102,8 +101,7 @@ async fn each_of_several_targets_has_its_box() {
 
 #[tokio::test]
 async fn what_cannot_be_drawn_is_not_tracked() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     let path = format!("/sessions/{id}/frames");
     let request = app.request(Method::POST, &path, &[("draw", "true")]);
     let several = form([1, 2].map(pictures::png));
@@ -138,8 +136,7 @@ async fn a_large_frame_is_drawn_smaller_with_its_box_in_place() {
 
 #[tokio::test]
 async fn a_frame_of_another_size_is_refused_before_it_is_decoded() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     let path = format!("/sessions/{id}/frames");
     // Whoever decodes this one finds the damage first.
     let mut damaged = pictures::png_of(64, 48);

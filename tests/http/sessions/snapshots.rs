@@ -76,8 +76,7 @@ async fn a_session_goes_on_elsewhere_bit_for_bit() {
 
 #[tokio::test]
 async fn a_damaged_snapshot_is_refused() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     let snapshot = app.snapshot(&id).await;
     let magic = SNAPSHOT_MAGIC.len();
     for position in (magic..snapshot.len()).step_by(snapshot.len() / 40) {
@@ -167,7 +166,7 @@ async fn a_tracker_goes_on_in_a_service_that_takes_unsigned_snapshots() {
     let again = open.post_numbered(id, 7, pictures::png(7)).await;
     expect_problem(again, "frame-differs").await;
     for t in 8..16 {
-        let answer = expect(open.post_frame(id, pictures::png(t)).await, StatusCode::OK).await;
+        let answer = open.track(id, t).await;
         let estimate = tracker.step(&frame(t)).unwrap();
         // The service rounds to a hundredth.
         for (side, value) in [("x", estimate.target.x), ("width", estimate.target.width)] {
@@ -190,7 +189,7 @@ fn with_answers(snapshot: &[u8], change: impl FnOnce(&mut Vec<Answered>)) -> Vec
 async fn a_forged_list_of_stored_answers_is_refused() {
     let app = unsigned(64).await;
     let id = app.open().await;
-    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    app.track(&id, 1).await;
     let snapshot = app.snapshot(&id).await;
     let same = with_answers(&snapshot, |_| ());
     let long = with_answers(&snapshot, |recent| *recent = recent.repeat(200_000));

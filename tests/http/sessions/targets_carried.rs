@@ -14,16 +14,12 @@ async fn unsigned() -> TestApplication {
     TestApplication::start_with(|config| config.access.unsigned_snapshots = true).await
 }
 
-async fn post(app: &TestApplication, id: &str, t: u32) -> Value {
-    expect(app.post_frame(id, pictures::png(t)).await, StatusCode::OK).await
-}
-
 #[tokio::test]
 async fn all_targets_go_on_elsewhere_bit_for_bit() {
     let (here, there) = (unsigned().await, unsigned().await);
     let id = open_with(&here, BOXES).await;
     for t in 1..6 {
-        post(&here, &id, t).await;
+        here.track(&id, t).await;
     }
     let last = expect(here.get_session(&id).await, StatusCode::OK).await["answer"].clone();
     let restored = there.create(here.snapshot(&id).await, &[]).await;
@@ -35,7 +31,7 @@ async fn all_targets_go_on_elsewhere_bit_for_bit() {
     assert_eq!(again.headers()["replayed"], "true");
     assert_eq!(expect(again, StatusCode::OK).await, last);
     for t in 6..16 {
-        let (a, b) = (post(&here, &id, t).await, post(&there, new, t).await);
+        let (a, b) = (here.track(&id, t).await, there.track(new, t).await);
         assert_eq!(a, b, "frame {t}");
     }
     assert!(here.snapshot(&id).await == there.snapshot(new).await);
@@ -71,7 +67,7 @@ async fn a_stream_answers_for_all_targets_and_corrects_one() {
     let mut stream = StreamClient::open(app.address, &id, "").await;
     for t in 1..=2 {
         stream.send(pictures::png(t)).await;
-        assert_eq!(stream.message().await, post(&app, &posted, t).await);
+        assert_eq!(stream.message().await, app.track(&posted, t).await);
     }
     stream.say(r#"{"see": true, "target": 1}"#).await;
     stream.send(pictures::png(3)).await;
@@ -120,7 +116,7 @@ async fn several_targets_are_tracked_without_a_session() {
         let snapshot = tracked["snapshot"].clone();
         let next = track(json!({"frame": frame(t), "snapshot": snapshot})).await;
         tracked = expect(next, StatusCode::OK).await;
-        assert_eq!(tracked["targets"], post(&app, &id, t).await["targets"]);
+        assert_eq!(tracked["targets"], app.track(&id, t).await["targets"]);
     }
     let snapshot = tracked["snapshot"].clone();
     let given = json!({"frame": frame(4), "snapshot": snapshot, "box": "42,31,18,14", "target": 1});

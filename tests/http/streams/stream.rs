@@ -7,7 +7,7 @@ use crate::requests::lines::posted;
 use crate::stream_client::{Received, StreamClient};
 use bagtrack::http::Secret;
 use image::ImageFormat;
-use reqwest::{Method, StatusCode};
+use reqwest::StatusCode;
 use serde_json::Value;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
@@ -40,8 +40,7 @@ async fn frames_sent_ahead_get_the_answers_of_plain_posts_in_order() {
 
 #[tokio::test]
 async fn a_box_before_a_frame_corrects_the_target() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     let mut stream = StreamClient::open(app.address, &id, "").await;
     stream.say(r#"{"box": [22, 16, 16, 12]}"#).await;
     stream.say(r#"{"frame": 1}"#).await;
@@ -170,8 +169,7 @@ async fn after_a_broken_line_nothing_is_lost_and_nothing_tracked_twice() {
 
 #[tokio::test]
 async fn a_newer_stream_ends_the_older_one() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     let mut old = StreamClient::open(app.address, &id, "").await;
     old.send(pictures::png(1)).await;
     assert_eq!(old.message().await["frame"], 1);
@@ -215,12 +213,7 @@ async fn a_page_opens_a_stream_with_its_token_as_a_protocol() {
     });
     let app = app.await;
     let (id, other) = (app.open().await, app.open().await);
-    let made = app.request(
-        Method::POST,
-        &format!("/sessions/{id}/token"),
-        &[("seconds", "100")],
-    );
-    let token = expect(made.send().await.unwrap(), StatusCode::OK).await;
+    let token = app.made_token(&id, &[("seconds", "100")]).await;
     let token = token["token"].as_str().unwrap();
     let offer = format!("bagtrack, {token}");
     let open = async |id: &str, headers: &[(&'static str, &str)]| {
@@ -304,8 +297,7 @@ async fn a_stream_has_the_quotas_and_limits_of_posts() {
     assert!(started.elapsed() > Duration::from_millis(250));
     drop(stream);
 
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     let mut stream = StreamClient::open(app.address, &id, "").await;
     stream.send(vec![0; 400 << 10]).await;
     let refused = stream.message().await;
@@ -390,8 +382,7 @@ async fn time_of_frames(app: &TestApplication, address: SocketAddr, count: u32) 
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn messages_without_a_frame_have_a_rate_and_a_frame_after_them_its_answer() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     let mut client = StreamClient::open(app.address, &id, "").await;
     // Unmasked by a mask of zeros: `{}` as text, 22,000 times. The client may send 2,000 at once and 10,000 a second.
     let text = [0x81, 0x82, 0, 0, 0, 0, b'{', b'}'];

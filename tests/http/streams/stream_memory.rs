@@ -1,22 +1,17 @@
 //! What streams hold while nothing, or a part of a message, comes over them.
 
-use crate::application::{BOX, TestApplication, behind_a_proxy, expect, expect_problem};
+use crate::application::{TestApplication, bound_bodies, expect, expect_problem};
 use crate::pictures;
 use crate::stream_client::{Received, StreamClient};
 use bagtrack_testing::within::within;
-use reqwest::{Method, Response, StatusCode};
+use reqwest::StatusCode;
 use std::time::Duration;
 
 /// The head of a binary message of 100,000 bytes, masked with zeros.
 const HEAD: [u8; 14] = [0x82, 0xFF, 0, 0, 0, 0, 0, 1, 0x86, 0xA0, 0, 0, 0, 0];
 
 async fn small_memory() -> TestApplication {
-    let app = TestApplication::start_with(|config| {
-        config.max_body_bytes = 150_000;
-        config.max_upload_bytes = 300_000;
-        config.limits.client_upload_bytes = Some(300_000);
-    });
-    app.await
+    TestApplication::start_with(|config| bound_bodies(config, 150_000, 300_000)).await
 }
 
 #[tokio::test]
@@ -96,36 +91,4 @@ async fn a_message_that_does_not_end_ends_its_stream() {
     let problem = stream.message().await;
     assert_eq!(problem["type"], "/docs/problems#body-timeout");
     assert!(matches!(stream.receive().await, Received::Closed(4408)));
-}
-
-async fn create_as(app: &TestApplication, client: &str) -> Response {
-    let request = app.request(Method::POST, "/sessions", &[("box", BOX)]);
-    let request = request.header("x-forwarded-for", client);
-    request.body(pictures::png(0)).send().await.unwrap()
-}
-
-#[tokio::test]
-async fn one_client_has_a_share_of_the_streams() {
-    let app = TestApplication::start_with(|config| {
-        behind_a_proxy(config);
-        config.limits.client_connections = Some(2);
-    });
-    let app = app.await;
-    let mut held = Vec::new();
-    for (client, status) in [
-        ("198.51.100.1", 101),
-        ("198.51.100.1", 101),
-        ("198.51.100.1", 429),
-        ("198.51.100.2", 101),
-    ] {
-        let created = expect(create_as(&app, client).await, StatusCode::CREATED).await;
-        let (id, from) = (created["id"].as_str().unwrap(), ("x-forwarded-for", client));
-        match StreamClient::try_open(app.address, id, "", &[from]).await {
-            Ok(stream) => {
-                assert_eq!(status, 101, "{client}");
-                held.push(stream);
-            }
-            Err(refused) => assert_eq!(refused.status().as_u16(), status, "{client}"),
-        }
-    }
 }

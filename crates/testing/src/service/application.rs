@@ -18,6 +18,13 @@ pub fn behind_a_proxy(config: &mut Config) {
     config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
 }
 
+/// Bodies may take so many bytes, each and all together, and those of one client all of them.
+pub fn bound_bodies(config: &mut Config, each: usize, all: usize) {
+    config.max_body_bytes = each;
+    config.max_upload_bytes = all;
+    config.limits.client_upload_bytes = Some(all);
+}
+
 pub struct TestApplication {
     pub address: SocketAddr,
     pub client: Client,
@@ -32,6 +39,13 @@ impl TestApplication {
     /// Starts with the default settings.
     pub async fn start() -> Self {
         Self::start_with(|_| ()).await
+    }
+
+    /// The same, with a session that is open.
+    pub async fn with_session() -> (Self, String) {
+        let app = Self::start().await;
+        let id = app.open().await;
+        (app, id)
     }
 
     /// Starts with other settings. Time limits are long, so that a busy machine does not fail a test.
@@ -79,6 +93,12 @@ impl TestApplication {
         self.served.await.unwrap()
     }
 
+    /// Asks the service to end, and waits for that; gives the same.
+    pub async fn end(mut self) -> bool {
+        self.shut_down();
+        self.ended().await
+    }
+
     pub fn request(&self, method: Method, path: &str, query: &[(&str, &str)]) -> RequestBuilder {
         let url = format!("http://{}{path}", self.address);
         let url = match query {
@@ -102,13 +122,23 @@ impl TestApplication {
         request.body(frame).send().await.unwrap()
     }
 
-    /// Opens a session on the first drawn frame, with seed 7.
+    /// Opens a session on the first drawn frame with these settings; gives the answer.
+    pub async fn opened(&self, query: &[(&str, &str)]) -> Value {
+        let response = self.create(pictures::png(0), query).await;
+        expect(response, StatusCode::CREATED).await
+    }
+
+    /// The same with the usual box and seed 7; gives its id.
     pub async fn open(&self) -> String {
-        let response = self
-            .create(pictures::png(0), &[("box", BOX), ("seed", "7")])
-            .await;
-        let created = expect(response, StatusCode::CREATED).await;
+        let created = self.opened(&[("box", BOX), ("seed", "7")]).await;
         created["id"].as_str().unwrap().to_owned()
+    }
+
+    /// `POST /sessions` of the client at this address, which a proxy tells.
+    pub async fn create_as(&self, client: &str) -> Response {
+        let request = self.request(Method::POST, "/sessions", &[("box", BOX)]);
+        let request = request.header("x-forwarded-for", client);
+        request.body(pictures::png(0)).send().await.unwrap()
     }
 
     /// `POST /sessions/{id}/frames`, without a body so far.
@@ -119,6 +149,11 @@ impl TestApplication {
     pub async fn post_frame(&self, id: &str, frame: Vec<u8>) -> Response {
         let request = self.frames_request(id, &[]);
         request.body(frame).send().await.unwrap()
+    }
+
+    /// Posts drawn frame `t`, which is taken; gives the answer.
+    pub async fn track(&self, id: &str, t: u32) -> Value {
+        expect(self.post_frame(id, pictures::png(t)).await, StatusCode::OK).await
     }
 
     /// `POST /sessions/{id}/frames?frame=N` with a raw body.
@@ -148,6 +183,18 @@ impl TestApplication {
     pub async fn delete_session(&self, id: &str) -> Response {
         let request = self.request(Method::DELETE, &format!("/sessions/{id}"), &[]);
         request.send().await.unwrap()
+    }
+
+    /// `POST /sessions/{id}/token`, which is granted; gives the answer.
+    pub async fn made_token(&self, id: &str, query: &[(&str, &str)]) -> Value {
+        let request = self.request(Method::POST, &format!("/sessions/{id}/token"), query);
+        expect(request.send().await.unwrap(), StatusCode::OK).await
+    }
+
+    /// A token for this session alone.
+    pub async fn token(&self, id: &str) -> String {
+        let made = self.made_token(id, &[]).await;
+        made["token"].as_str().unwrap().to_owned()
     }
 
     /// `GET /sessions/{id}/snapshot`.
