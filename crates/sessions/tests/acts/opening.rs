@@ -1,5 +1,6 @@
 //! Sessions that are opened, found, and ended.
 
+use crate::common::assert_matches;
 use crate::world::{
     FIRST, FLOW, FREE, LEASE, Quota, SECOND, SESSIONS, at_first, open, params, parts, picture,
     post_numbered, request, service,
@@ -85,10 +86,7 @@ async fn a_full_service_opens_none_until_a_session_has_gone() {
         let one_more = request(&service, key, 0, at_first(Boxes::One(FIRST)));
         let refused = service.open(one_more).await.unwrap_err();
         let full = TooManySessions(SESSIONS);
-        assert!(
-            matches!(&refused, OpenError::Act(ActError::TooManySessions(told)) if *told == full),
-            "{refused}"
-        );
+        assert_matches!(refused, OpenError::Act(ActError::TooManySessions(told)) if *told == full);
     }
     assert!(service.check_room(&FREE).is_err());
     // One that was used lives, the others have expired.
@@ -185,10 +183,7 @@ async fn what_a_session_cannot_begin_with_is_told_with_the_box_that_is_wrong() {
         let OpenError::Start { error, listed } = refused else {
             panic!("{refused}");
         };
-        assert!(
-            matches!(error, StartError::Refused { target, .. } if target == which),
-            "{error}"
-        );
+        assert_matches!(error, StartError::Refused { target, .. } if *target == which);
         assert_eq!(listed, expected);
     }
     let no_picture = Start::Frame {
@@ -237,10 +232,7 @@ async fn a_session_is_its_owner_s_until_it_expires_or_is_ended() {
     let ended = open(&service, Boxes::One(FIRST)).await;
     let id = ended.id();
     let refused = service.end(id, &ann, FLOW).await;
-    assert!(
-        matches!(refused, Err(ActError::NoSession(NoSession::Unknown))),
-        "{refused:?}"
-    );
+    assert_matches!(refused, Err(ActError::NoSession(NoSession::Unknown)));
     service.end(id, &nobody, FLOW).await.unwrap();
     assert_eq!(missing(&service, id, &nobody).await, NoSession::Unknown);
     assert!(service.end(id, &nobody, FLOW).await.is_err());

@@ -1,5 +1,6 @@
 //! Which requests keep a session alive.
 
+use crate::common::assert_matches;
 use crate::world::{
     FIRST, FLOW, LEASE, WORK_TIMEOUT, open, parts, picture, pictures, place, post, post_numbered,
     service, small_picture,
@@ -67,12 +68,9 @@ async fn a_session_does_not_end_because_there_was_no_time_for_its_frame() {
         (posted, LEASE.idle),
     ] {
         let refused = post(&service, &session, batch).await.unwrap_err();
-        assert!(
-            matches!(
-                refused,
-                FramesError::Act(ActError::Stopped(Stopped::Deadline))
-            ),
-            "{refused}"
+        assert_matches!(
+            refused,
+            FramesError::Act(ActError::Stopped(Stopped::Deadline))
         );
         assert!(refused.is_temporary());
         assert_eq!(left(&session), lease.as_secs());
@@ -94,10 +92,7 @@ async fn a_request_that_costs_too_much_is_refused_and_renews_nothing() {
     let many = FrameBatch::posted(Some(1), vec![picture(1); 5_000], None);
     let refused = post(&service, &session, many).await.unwrap_err();
     let cost = Stopped::Cost(Duration::from_millis(200));
-    assert!(
-        matches!(&refused, FramesError::Act(ActError::Stopped(told)) if *told == cost),
-        "{refused}"
-    );
+    assert_matches!(refused, FramesError::Act(ActError::Stopped(told)) if *told == cost);
     assert!(!refused.is_temporary());
     assert!(session.ttl() < LEASE.first);
     assert_eq!(session.latest_frame(), 0);
@@ -118,10 +113,7 @@ async fn the_work_of_one_request_has_its_processor_time_together() {
     let one = place(&service);
     assert!(service.run(one.clone(), work).await.is_ok());
     let refused = service.run(one, work).await;
-    assert!(
-        matches!(refused, Err(ActError::Stopped(Stopped::Cost(_)))),
-        "{refused:?}"
-    );
+    assert_matches!(refused, Err(ActError::Stopped(Stopped::Cost(_))));
     // A request may have the time of several.
     let three = place(&service).with_cpu_of(3);
     for _ in 0..3 {

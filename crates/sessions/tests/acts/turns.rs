@@ -1,5 +1,6 @@
 //! Frames of one session in several requests at once: which waits for which.
 
+use crate::common::assert_matches;
 use crate::world::{FIRST, FLOW, open, pictures, place, post_numbered, service};
 use bagtrack_sessions::{ActError, Boxes, Clock, FrameBatch, FramesError, QueueFull, clock};
 use std::time::Duration;
@@ -82,13 +83,7 @@ async fn an_early_frame_leaves_its_place_in_the_queue_to_others_meanwhile() {
     };
     let (turn, ()) = tokio::join!(waiting, others);
     let refused = turn.unwrap_err();
-    assert!(
-        matches!(
-            refused,
-            FramesError::Act(bagtrack_sessions::ActError::QueueFull(QueueFull))
-        ),
-        "{refused}"
-    );
+    assert_matches!(refused, FramesError::Act(ActError::QueueFull(QueueFull)));
     assert!(service.admission.check_place(FLOW).is_ok());
 }
 
@@ -104,10 +99,7 @@ async fn the_last_place_at_a_session_is_left_to_the_frame_whose_turn_it_is() {
     permits.push(session.enter().unwrap());
     let refused = service.wait_for_turn(&permits[3], place(&service), Some(3));
     let refused = refused.await.map(drop).unwrap_err();
-    assert!(
-        matches!(refused, FramesError::Act(ActError::Busy(_))),
-        "{refused}"
-    );
+    assert_matches!(refused, FramesError::Act(ActError::Busy(_)));
     // Who waits already goes on waiting.
     assert!(futures_util::poll!(&mut waiting).is_pending());
     drop(waiting);
@@ -139,12 +131,6 @@ async fn a_request_that_waits_at_a_session_that_ends_is_told() {
     assert!(service.registry.remove(session.name()));
     drop(before);
     let told = waiting.await.unwrap_err();
-    assert!(
-        matches!(
-            told,
-            FramesError::Act(bagtrack_sessions::ActError::NoSession(_))
-        ),
-        "{told}"
-    );
+    assert_matches!(told, FramesError::Act(ActError::NoSession(_)));
     assert!(!told.is_temporary());
 }

@@ -11,6 +11,15 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
+/// Asserts that a value is of this pattern.
+macro_rules! assert_matches {
+    ($value:expr, $($pattern:tt)+) => {{
+        let value = &$value;
+        assert!(matches!(value, $($pattern)+), "{value:?}");
+    }};
+}
+pub(crate) use assert_matches;
+
 pub const FLOW: Flow = Flow(0);
 /// The target in the first picture.
 pub const FIRST: Rect = Rect {
