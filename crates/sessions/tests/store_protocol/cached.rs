@@ -1,8 +1,9 @@
 //! What one replica makes of a session that another has, in a store that works.
 
-use crate::common::{FLOW, place};
+use crate::common::{FLOW, assert_matches, place};
 use crate::formats::{open, post};
-use crate::memory::MemoryStore;
+use crate::hostile::HostileStore;
+use crate::memory::Records;
 use crate::pictures::{FRAMES, picture};
 use crate::world::{ID, LONG, parts, service, service_by, start};
 use bagtrack_sessions::{
@@ -14,7 +15,7 @@ use std::time::Duration;
 
 /// Two replicas, the first of which has opened a session.
 async fn two() -> [SessionService; 2] {
-    let store: Arc<dyn SessionStore> = Arc::new(MemoryStore::default());
+    let store: Arc<dyn SessionStore> = Arc::new(HostileStore::at_once(Records::default()));
     let replicas = [0, 1].map(|_| service(Some(store.clone()), 1));
     open(&replicas[0], ID, start(1)).await;
     replicas
@@ -24,10 +25,7 @@ async fn two() -> [SessionService; 2] {
 async fn a_session_of_another_replica_is_its_owner_s_alone() {
     let [_, other] = two().await;
     let of_ann = other.find(ID, &Owner::named("ann"), FLOW).await;
-    assert!(
-        matches!(of_ann, Err(ActError::NoSession(NoSession::Unknown))),
-        "{of_ann:?}"
-    );
+    assert_matches!(of_ann, Err(ActError::NoSession(NoSession::Unknown)));
     let own = other.find(ID, &Owner::default(), FLOW).await.unwrap();
     assert_eq!(own.latest_frame(), 0);
     other.end(ID, &Owner::default(), FLOW).await.unwrap();
@@ -39,10 +37,7 @@ async fn a_session_that_was_ended_elsewhere_leaves_memory() {
     other.end(ID, &Owner::default(), FLOW).await.unwrap();
     let cached = first.find(ID, &Owner::default(), FLOW).await.unwrap();
     let refused = first.refresh(&cached, None, FLOW).await;
-    assert!(
-        matches!(refused, Err(ActError::NoSession(NoSession::Unknown))),
-        "{refused:?}"
-    );
+    assert_matches!(refused, Err(ActError::NoSession(NoSession::Unknown)));
     assert!(!first.registry.is_live(ID));
     let gone = first.find(ID, &Owner::default(), FLOW).await;
     assert!(matches!(gone, Err(ActError::NoSession(_))), "{gone:?}");
@@ -111,7 +106,7 @@ async fn frames_in_turns_at_two_replicas_have_the_answers_of_one() {
 
 #[tokio::test]
 async fn the_state_is_written_at_every_third_frame_and_at_each_before_the_end() {
-    let store: Arc<dyn SessionStore> = Arc::new(MemoryStore::default());
+    let store: Arc<dyn SessionStore> = Arc::new(HostileStore::at_once(Records::default()));
     let replica = service(Some(store.clone()), 3);
     open(&replica, ID, start(1)).await;
     for (number, checkpoint) in [(1, 0), (2, 0), (3, 3), (4, 3)] {
@@ -244,10 +239,7 @@ async fn a_session_lives_as_long_as_the_store_says() {
     assert!(session.ttl() <= minute, "{:?}", session.ttl());
     clock.advance(minute);
     let expired = other.find(ID, &Owner::default(), FLOW).await.unwrap_err();
-    assert!(
-        matches!(expired, ActError::NoSession(NoSession::Expired)),
-        "{expired}"
-    );
+    assert_matches!(expired, ActError::NoSession(NoSession::Expired));
 }
 
 #[tokio::test]
@@ -265,9 +257,6 @@ async fn a_session_that_the_store_has_lost_is_told_as_lost() {
     );
     clock.advance(Duration::from_secs(1));
     let lost = send(&first, Some(1), picture(0, 1)).await.unwrap_err();
-    assert!(
-        matches!(lost, FramesError::Act(ActError::NoSession(NoSession::Lost))),
-        "{lost}"
-    );
+    assert_matches!(lost, FramesError::Act(ActError::NoSession(NoSession::Lost)));
     assert!(!first.registry.is_live(ID));
 }

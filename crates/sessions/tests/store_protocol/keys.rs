@@ -1,7 +1,8 @@
 //! Requests with an idempotency key, at replicas with one store.
 
 use crate::common::{FIRST, FLOW};
-use crate::memory::MemoryStore;
+use crate::hostile::HostileStore;
+use crate::memory::Records;
 use crate::pictures::{params, picture};
 use crate::redis::Redis;
 use crate::world::{LONG, request, service};
@@ -69,7 +70,7 @@ async fn keys_hold_for(store: Arc<dyn SessionStore>) {
 
 #[tokio::test]
 async fn with_a_store_in_memory_a_key_opens_one_session() {
-    keys_hold_for(Arc::new(MemoryStore::default())).await;
+    keys_hold_for(Arc::new(HostileStore::at_once(Records::default()))).await;
 }
 
 #[tokio::test]

@@ -1,10 +1,8 @@
-//! A store in memory, with the rules of the scripts that Redis runs.
+//! The records of a store in memory, with the rules of the scripts that Redis runs.
 
 use crate::records::Backend;
-use bagtrack_sessions::{Commit, Outcome, Record, SessionName, SessionStore, StoreFuture, Version};
+use bagtrack_sessions::{Commit, Outcome, Record, SessionName, Version};
 use std::collections::{BTreeSet, HashMap};
-use std::sync::{Mutex, MutexGuard};
-use std::time::Duration;
 use uuid::Uuid;
 
 /// A record, its last frame that was committed, and the token of the last write.
@@ -145,55 +143,5 @@ impl Backend for Records {
 
     fn knows_repeats(&self) -> bool {
         true
-    }
-}
-
-/// A store that answers at once.
-#[derive(Debug, Default)]
-pub struct MemoryStore(Mutex<Records>);
-
-impl MemoryStore {
-    fn records(&self) -> MutexGuard<'_, Records> {
-        self.0.lock().unwrap()
-    }
-}
-
-fn at_once<'a, T: Send + 'a>(value: T) -> StoreFuture<'a, T> {
-    Box::pin(std::future::ready(Ok(value)))
-}
-
-impl SessionStore for MemoryStore {
-    fn create<'a>(&'a self, id: Uuid, record: &'a Record) -> StoreFuture<'a, Outcome> {
-        at_once(self.records().create(rand::random(), id, record))
-    }
-
-    fn load(&self, id: Uuid) -> StoreFuture<'_, Option<Record>> {
-        at_once(self.records().load(id))
-    }
-
-    fn commit<'a>(&'a self, commit: Commit<'a>) -> StoreFuture<'a, Outcome> {
-        at_once(self.records().commit(rand::random(), commit))
-    }
-
-    fn check(
-        &self,
-        name: SessionName,
-        version: Version,
-        takes_over: bool,
-        _renew: Option<Duration>,
-    ) -> StoreFuture<'_, Outcome> {
-        at_once(self.records().check(name, version, takes_over))
-    }
-
-    fn fence(&self, name: SessionName, version: Version) -> StoreFuture<'_, Outcome> {
-        at_once(self.records().fence(name, version))
-    }
-
-    fn end(&self, name: SessionName, _ttl: Duration) -> StoreFuture<'_, bool> {
-        at_once(self.records().end(name))
-    }
-
-    fn secret(&self, new: [u8; 32]) -> StoreFuture<'_, [u8; 32]> {
-        at_once(self.records().secret(new))
     }
 }
