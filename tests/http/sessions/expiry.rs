@@ -18,7 +18,7 @@ async fn a_session_expires_when_it_is_not_used() {
         if t > 1 {
             app.clock.advance(ALMOST);
         }
-        expect(app.post_frame(&id, pictures::png(t)).await, StatusCode::OK).await;
+        app.track(&id, t).await;
         let view = expect(app.get_session(&id).await, StatusCode::OK).await;
         let now = view["expires_at"].as_str().unwrap().to_owned();
         assert!(now > expires_at, "use moves the expiry on");
@@ -55,22 +55,10 @@ async fn a_session_does_not_expire_while_a_frame_is_on_its_way() {
 }
 
 #[tokio::test]
-async fn a_session_without_frames_goes_soon_and_the_first_frame_keeps_it() {
-    let app = TestApplication::start().await;
-    let (orphan, used) = (app.open().await, app.open().await);
-    let answer = app.post_frame(&used, pictures::png(1)).await;
-    expect(answer, StatusCode::OK).await;
-    app.clock.advance(Duration::from_secs(61));
-    expect_problem(app.get_session(&orphan).await, "session-expired").await;
-    app.clock.advance(ALMOST - Duration::from_secs(61));
-    expect(app.get_session(&used).await, StatusCode::OK).await;
-}
-
-#[tokio::test]
 async fn a_frame_that_is_refused_does_not_keep_its_session_alive() {
     let app = TestApplication::start_with(|config| config.session_idle = IDLE).await;
     let (id, new) = (app.open().await, app.open().await);
-    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    app.track(&id, 1).await;
     let refused = app.post_frame(&new, b"no frame".to_vec()).await;
     expect_problem(refused, "unsupported-image").await;
     app.clock.advance(Duration::from_secs(61));

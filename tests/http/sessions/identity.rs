@@ -2,7 +2,6 @@
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::pictures;
-use crate::security::access::{BEN, two_clients};
 use reqwest::{Method, RequestBuilder, StatusCode};
 use std::time::Duration;
 
@@ -22,7 +21,7 @@ async fn the_same_request_gets_the_same_answer_also_after_a_frame() {
     assert!(!first.headers().contains_key("replayed"));
     let body = first.text().await.unwrap();
     assert!(body.contains(ID), "{body}");
-    expect(app.post_frame(ID, pictures::png(1)).await, StatusCode::OK).await;
+    app.track(ID, 1).await;
     app.clock.advance(Duration::from_secs(30));
 
     let again = put(&app, ID, &[("box", BOX)]).send().await.unwrap();
@@ -48,18 +47,6 @@ async fn another_request_for_the_same_id_is_refused() {
     expect(app.delete_session(ID).await, StatusCode::NO_CONTENT).await;
     let anew = put(&app, ID, &[("box", BOX), ("seed", "8")]);
     assert_eq!(anew.send().await.unwrap().status(), StatusCode::CREATED);
-}
-
-#[tokio::test]
-async fn an_id_of_another_client_is_taken() {
-    let mut app = two_clients().await;
-    let query = [("box", BOX), ("seed", "7")];
-    let opened = put(&app, ID, &query).send().await.unwrap();
-    assert_eq!(opened.status(), StatusCode::CREATED);
-    app.key = Some(BEN.to_owned());
-    let taken = put(&app, ID, &query).send().await.unwrap();
-    expect_problem(taken, "session-exists").await;
-    expect_problem(app.get_session(ID).await, "session-not-found").await;
 }
 
 #[tokio::test]

@@ -2,11 +2,11 @@
 
 use crate::application::{BOX, TestApplication, expect, expect_detail, expect_problem};
 use crate::pictures;
-use crate::requests::forms::{form, part};
+use crate::requests::forms::part;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use reqwest::multipart::Form;
-use reqwest::{Method, Response, StatusCode};
+use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 
 /// The target of the scene, and two places behind it.
@@ -15,8 +15,7 @@ pub const BOXES: &str = "20,15,16,12;40,30,18,14;6,36,14,14";
 /// Opens a session with these boxes, with seed 7.
 pub async fn open_with(app: &TestApplication, boxes: &str) -> String {
     let query = [("boxes", boxes), ("seed", "7")];
-    let created = app.create(pictures::png(0), &query).await;
-    let created = expect(created, StatusCode::CREATED).await;
+    let created = app.opened(&query).await;
     created["id"].as_str().unwrap().to_owned()
 }
 
@@ -27,24 +26,19 @@ fn answer_of(answer: &Value, k: usize) -> Value {
     single
 }
 
-async fn post(app: &TestApplication, id: &str, t: u32) -> Value {
-    expect(app.post_frame(id, pictures::png(t)).await, StatusCode::OK).await
-}
-
 #[tokio::test]
 async fn all_targets_are_tracked_and_the_first_as_if_it_were_alone() {
     let app = TestApplication::start().await;
     let single = app.open().await;
     let query = [("boxes", BOXES), ("seed", "7")];
-    let created = app.create(pictures::png(0), &query).await;
-    let created = expect(created, StatusCode::CREATED).await;
+    let created = app.opened(&query).await;
     assert_eq!(created["boxes"].as_array().unwrap().len(), 3);
     assert_eq!(created["boxes"][2]["x"], 6.0);
     assert_eq!(created["box"], created["boxes"][0]);
     let id = created["id"].as_str().unwrap();
     for t in 1..=12 {
-        let alone = post(&app, &single, t).await;
-        let answer = post(&app, id, t).await;
+        let alone = app.track(&single, t).await;
+        let answer = app.track(id, t).await;
         assert_eq!(answer["frame"], t);
         assert_eq!(answer["targets"].as_array().unwrap().len(), 3);
         assert_eq!(answer_of(&answer, 0), alone);
@@ -62,16 +56,16 @@ async fn all_targets_are_tracked_and_the_first_as_if_it_were_alone() {
 async fn a_list_of_one_box_has_a_list_of_one_answer() {
     let app = TestApplication::start().await;
     let (single, id) = (app.open().await, open_with(&app, BOX).await);
-    let answer = post(&app, &id, 1).await;
+    let answer = app.track(&id, 1).await;
     assert_eq!(answer["targets"].as_array().unwrap().len(), 1);
-    assert_eq!(answer_of(&answer, 0), post(&app, &single, 1).await);
+    assert_eq!(answer_of(&answer, 0), app.track(&single, 1).await);
 }
 
 #[tokio::test]
 async fn boxes_come_in_the_query_in_a_form_and_in_json() {
     let app = TestApplication::start().await;
     let id = open_with(&app, BOXES).await;
-    let expected = post(&app, &id, 1).await;
+    let expected = app.track(&id, 1).await;
     let form = Form::new()
         .part("frame", part(pictures::png(0)))
         .text("boxes", BOXES)
@@ -93,7 +87,7 @@ async fn boxes_come_in_the_query_in_a_form_and_in_json() {
     for request in [form, json] {
         let created = expect(request.send().await.unwrap(), StatusCode::CREATED).await;
         let id = created["id"].as_str().unwrap();
-        assert_eq!(post(&app, id, 1).await, expected);
+        assert_eq!(app.track(id, 1).await, expected);
     }
 }
 
@@ -149,38 +143,9 @@ async fn a_correction_says_which_target_and_the_others_are_tracked() {
     let given = json!({"x": 42.0, "y": 31.0, "width": 18.0, "height": 14.0});
     assert_eq!(corrected["targets"][1]["box"], given);
     assert_eq!(corrected["targets"][1]["score"], 1.0);
-    let tracked = post(&app, &other, 1).await;
+    let tracked = app.track(&other, 1).await;
     assert_eq!(corrected["targets"][0], tracked["targets"][0]);
     assert_eq!(corrected["targets"][2], tracked["targets"][2]);
-    // Sent again it is replayed; for another target it is another request.
-    let again = put(&query).await;
-    assert_eq!(again.headers()["replayed"], "true");
-    assert_eq!(expect(again, StatusCode::OK).await, corrected);
-    let query = [("box", "42,31,18,14"), ("target", "0"), ("frame", "1")];
-    expect_problem(put(&query).await, "frame-differs").await;
-}
-
-#[tokio::test]
-async fn of_several_frames_all_targets_take_all_or_none() {
-    let app = TestApplication::start().await;
-    let (id, other) = (open_with(&app, BOXES).await, open_with(&app, BOXES).await);
-    let batch = async |frames: [Vec<u8>; 2]| -> Response {
-        let request = app.frames_request(&id, &[("frame", "1")]);
-        request.multipart(form(frames)).send().await.unwrap()
-    };
-    let bad = batch([pictures::png(1), b"no image".to_vec()]).await;
-    expect_problem(bad, "unsupported-image").await;
-    let good = async || batch([pictures::png(1), pictures::png(2)]).await;
-    let answers = expect(good().await, StatusCode::OK).await;
-    for t in 1..=2 {
-        assert_eq!(
-            answers["answers"][t - 1],
-            post(&app, &other, t as u32).await
-        );
-    }
-    let again = good().await;
-    assert_eq!(again.headers()["replayed"], "true");
-    assert_eq!(expect(again, StatusCode::OK).await, answers);
 }
 
 #[tokio::test]

@@ -1,5 +1,6 @@
 //! Frames of a session: which are taken, which are refused, and what is answered.
 
+use crate::common::assert_matches;
 use crate::world::{
     FIRST, PIXELS, SECOND, SIZE, at_first, open, parts, picture, pictures, place, png, post,
     post_numbered, request, service, small_picture,
@@ -38,6 +39,9 @@ async fn frames_are_answered_once_and_again_under_the_same_number() {
         .unwrap();
     assert!(again.replayed);
     assert_eq!(again.estimates, first.estimates);
+    let opening = post_numbered(&service, &session, 0, pictures(0..1)).await;
+    let opening = opening.unwrap();
+    assert!(opening.replayed && opening.estimates[0].first().target == FIRST);
     assert_eq!(session.latest_frame(), 3);
     // Its frames for themselves, too: answers of requests on their way may be lost.
     for (number, files) in [(1, pictures(1..3)), (2, pictures(2..3))] {
@@ -47,18 +51,17 @@ async fn frames_are_answered_once_and_again_under_the_same_number() {
         assert!(part.replayed);
         assert_eq!(part.estimates, first.estimates[from..from + count]);
     }
-    for (number, files) in [
-        (2, pictures(2..5)),
-        (3, pictures(1..2)),
-        (5, pictures(5..6)),
+    let out_of_order = |got| ReplayError::OutOfOrder { got, expected: 4 };
+    let differs = |got| ReplayError::Differs { got, expected: 4 };
+    for (number, files, expected) in [
+        // The last of these is new.
+        (2, pictures(2..5), out_of_order(2)),
+        (3, pictures(1..2), differs(3)),
+        (5, pictures(5..6), out_of_order(5)),
+        (u64::MAX, pictures(5..6), out_of_order(u64::MAX)),
     ] {
         let refused = post_numbered(&service, &session, number, files).await;
-        let Err(FramesError::Replay(error)) = refused else {
-            panic!("{refused:?}");
-        };
-        let (ReplayError::OutOfOrder { got, expected } | ReplayError::Differs { got, expected }) =
-            error;
-        assert_eq!((got, expected), (number, 4), "{error}");
+        assert_matches!(refused, Err(FramesError::Replay(error)) if *error == expected);
     }
     // Without a number it is the next one.
     let next = FrameBatch::posted(None, pictures(4..5), None);
@@ -69,8 +72,14 @@ async fn frames_are_answered_once_and_again_under_the_same_number() {
 
 #[tokio::test]
 async fn one_bad_frame_of_several_leaves_the_session_as_it_was() {
+    for boxes in [Boxes::One(FIRST), Boxes::List(vec![FIRST, SECOND])] {
+        one_bad_frame_leaves_it_as_it_was(boxes).await;
+    }
+}
+
+async fn one_bad_frame_leaves_it_as_it_was(boxes: Boxes) {
     let service = service(&Clock::default());
-    let session = open(&service, Boxes::One(FIRST)).await;
+    let session = open(&service, boxes).await;
     let before = session.latest();
     for bad in [small_picture(), "no picture".into()] {
         let files = vec![picture(1), bad.clone(), picture(3)];
@@ -152,10 +161,7 @@ async fn a_correction_is_of_one_target_which_there_is() {
     for target in [None, Some(2)] {
         let refused = post(&service, &list, corrected(target, to, 1)).await;
         let refused = refused.unwrap_err();
-        assert!(
-            matches!(refused, FramesError::NoSuchTarget { count: 2 }),
-            "{refused}"
-        );
+        assert_matches!(refused, FramesError::NoSuchTarget { count: 2 });
     }
     let fractions = corrected(Some(1), Rect::new(0.1, 0.1, 0.2, 0.2), 1);
     let refused = post(&service, &list, fractions).await.unwrap_err();
@@ -171,14 +177,13 @@ async fn a_correction_is_of_one_target_which_there_is() {
     let again = post(&service, &list, corrected(Some(1), to, 1)).await;
     assert!(again.unwrap().replayed);
     let moved = Rect { x: 31.0, ..to };
-    let differs = post(&service, &list, corrected(Some(1), moved, 1)).await;
-    assert!(
-        matches!(
+    for (target, to) in [(1, moved), (0, to)] {
+        let differs = post(&service, &list, corrected(Some(target), to, 1)).await;
+        assert_matches!(
             differs,
             Err(FramesError::Replay(ReplayError::Differs { .. }))
-        ),
-        "{differs:?}"
-    );
+        );
+    }
 
     let one = open(&service, Boxes::One(FIRST)).await;
     for (number, target) in [(1, None), (2, Some(0))] {
@@ -254,6 +259,10 @@ async fn the_last_answers_are_kept_and_more_where_that_is_asked_for() {
     // Each of them is given again, and changes nothing.
     let again = post_numbered(&service, &session, first, pictures(4..5));
     assert!(again.await.unwrap().replayed);
+    let (got, expected) = (first - 1, last + 1);
+    let late = post_numbered(&service, &session, got, pictures(4..5)).await;
+    let out_of_order = ReplayError::OutOfOrder { got, expected };
+    assert_matches!(late, Err(FramesError::Replay(error)) if *error == out_of_order);
     assert_eq!(session.latest_frame(), last);
     let keeps = FrameBatch {
         min_answers: KEPT_ANSWERS + 2,
