@@ -46,6 +46,9 @@ fn a_service_without_keys_is_for_this_machine_or_says_that_it_is_for_all() {
         matches!(open, AccessError::Open(at) if at == everywhere),
         "{open}"
     );
+    for variable in ["BAGTRACK_API_KEYS", "BAGTRACK_NO_AUTH"] {
+        assert!(open.to_string().contains(variable), "{open}");
+    }
     let no_auth = AccessConfig {
         no_auth: true,
         ..AccessConfig::default()
@@ -138,10 +141,13 @@ fn secrets_have_sixteen_characters() {
         for config in [snapshots, metrics] {
             match load(&config, here) {
                 Ok(_) => assert!(is_long),
-                Err(error) => assert!(
-                    !is_long && matches!(error, AccessError::ShortSecret),
-                    "{error}"
-                ),
+                Err(error) => {
+                    assert!(
+                        !is_long && matches!(error, AccessError::ShortSecret),
+                        "{error}"
+                    );
+                    assert!(error.to_string().contains("BAGTRACK_SNAPSHOT_KEYS"));
+                }
             }
         }
     }
