@@ -1,7 +1,7 @@
 //! The page at `/`, and the sample clips that it shows. `tests/page` has it in a browser.
 
 use crate::application::{TestApplication, expect, expect_problem};
-use reqwest::{Method, StatusCode};
+use reqwest::StatusCode;
 use std::collections::{BTreeSet, VecDeque};
 
 /// The paths below `/page/` that the text of a file names, and whether they are loaded with it, not when they are used.
@@ -52,25 +52,6 @@ async fn every_file_that_the_page_names_is_served_and_all_are_small() {
     assert!(at_once < 170_000, "{at_once}");
     assert!(later < 200_000, "{later}");
     expect_problem(app.get("/page/none.js").await, "route-not-found").await;
-}
-
-#[tokio::test]
-async fn a_browser_that_has_the_page_gets_no_second_copy() {
-    let app = TestApplication::start().await;
-    for path in ["/", "/page/main.js"] {
-        let first = app.get(path).await;
-        let tag = first.headers()["etag"].clone();
-        let again = app
-            .request(Method::GET, path, &[])
-            .header("if-none-match", tag);
-        let again = again.send().await.unwrap();
-        assert_eq!(again.status(), StatusCode::NOT_MODIFIED);
-        assert!(again.bytes().await.unwrap().is_empty());
-        let other = app
-            .request(Method::GET, path, &[])
-            .header("if-none-match", "\"0\"");
-        assert_eq!(other.send().await.unwrap().status(), StatusCode::OK);
-    }
 }
 
 #[tokio::test]

@@ -4,9 +4,7 @@
 use crate::application::BOX;
 use crate::pictures;
 use crate::program::{self, Program};
-use crate::requests::forms::form;
 use bagtrack_testing::within::within;
-use image::ImageFormat;
 use reqwest::{Client, StatusCode};
 use rustix::process::Signal;
 use serde_json::Value;
@@ -69,30 +67,6 @@ fn every_request_has_its_line_in_the_log_when_the_service_has_ended() {
     let answered = messages.iter().filter(|message| *message == "answered");
     assert_eq!(answered.count(), 3, "{messages:?}");
     assert_eq!(messages.last().unwrap(), "bye");
-}
-
-#[tokio::test]
-async fn frames_one_by_one_get_the_answers_of_frames_together() {
-    let service = serve();
-    let (client, url) = (reqwest::Client::new(), service.url(""));
-    let jpeg = |t| pictures::encode(pictures::scene(t), ImageFormat::Jpeg);
-    let open = async || {
-        let create = format!("{url}/sessions?box={BOX}&seed=7");
-        let created = client.post(create).body(jpeg(0)).send().await.unwrap();
-        let created: Value = created.json().await.unwrap();
-        format!("{url}/sessions/{}/frames", created["id"].as_str().unwrap())
-    };
-    let (one_by_one, together) = (open().await, open().await);
-    let mut answers = Vec::new();
-    for t in 1..=20 {
-        let answer = client.post(&one_by_one).body(jpeg(t)).send().await.unwrap();
-        answers.push(answer.json::<Value>().await.unwrap());
-    }
-    let frames = form((1..=20).map(jpeg));
-    let all = client.post(&together).multipart(frames).send().await;
-    let all = all.unwrap();
-    let all: Value = all.json().await.unwrap();
-    assert_eq!(all["answers"], Value::from(answers));
 }
 
 #[tokio::test]

@@ -59,7 +59,10 @@ async fn what_the_program_holds_is_compressed_for_clients_that_take_gzip() {
             let headers = [("accept-encoding", encoding), ("if-none-match", &*tag)];
             let known = get(&app, path, &headers).await;
             assert_eq!(known.status(), StatusCode::NOT_MODIFIED, "{path}");
+            assert!(known.bytes().await.unwrap().is_empty());
         }
+        let other = get(&app, path, &[("if-none-match", "\"0\"")]).await;
+        assert_eq!(other.status(), StatusCode::OK, "{path}");
         let refused = get(&app, path, &[("accept-encoding", "gzip;q=0")]).await;
         assert_eq!(refused.headers().get("content-encoding"), None, "{path}");
     }
@@ -67,8 +70,7 @@ async fn what_the_program_holds_is_compressed_for_clients_that_take_gzip() {
 
 #[tokio::test]
 async fn answers_to_frames_are_never_compressed() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
+    let (app, id) = TestApplication::with_session().await;
     for accept in ["application/json", "application/x-ndjson", "image/png"] {
         let request = app.frames_request(&id, &[]);
         let request = request
