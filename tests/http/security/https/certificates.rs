@@ -1,5 +1,7 @@
 //! Certificates and their keys, in files.
 
+use crate::application::TestApplication;
+use bagtrack::http::{Config, TlsConfig};
 use rcgen::{
     BasicConstraints, CertificateParams, IsCa, Issuer, KeyPair, PKCS_ECDSA_P256_SHA256,
     PKCS_ECDSA_P384_SHA384, PKCS_ED25519, SignatureAlgorithm,
@@ -99,5 +101,17 @@ impl Files {
 
     pub fn folder(&self) -> &Path {
         self.folder.path()
+    }
+
+    /// The service in this process, with this certificate.
+    pub async fn service(&self, change: impl FnOnce(&mut Config)) -> TestApplication {
+        TestApplication::start_with(|config| {
+            config.tls = TlsConfig {
+                tls_cert: Some(self.certificate()),
+                tls_key: Some(self.key()),
+            };
+            change(config);
+        })
+        .await
     }
 }

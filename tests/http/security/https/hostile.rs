@@ -2,7 +2,6 @@
 
 use super::certificates::{Authority, Files, kinds};
 use super::client::{Client, trusting};
-use super::service::Service;
 use bagtrack_testing::within::within;
 use std::net::IpAddr;
 use std::time::{Duration, Instant};
@@ -23,7 +22,7 @@ fn issued() -> (Authority, Files) {
 async fn a_handshake_has_to_end_in_time() {
     let (authority, files) = issued();
     let limit = Duration::from_secs(1);
-    let service = Service::start(Some(&files), |config| config.header_timeout = limit).await;
+    let service = files.service(|config| config.header_timeout = limit).await;
     let started = Instant::now();
     let mut slow = Vec::new();
     for begun in [0, 1, HELLO_BEGUN.len()] {
@@ -61,7 +60,7 @@ async fn a_handshake_has_to_end_in_time() {
 #[tokio::test]
 async fn handshakes_count_as_connections_and_make_room_for_others() {
     let (authority, files) = issued();
-    let service = Service::start(Some(&files), |config| {
+    let service = files.service(|config| {
         config.max_connections = 3;
         config.limits.client_connections = Some(3);
         config.header_timeout = Duration::from_secs(600);
@@ -95,7 +94,7 @@ async fn handshakes_count_as_connections_and_make_room_for_others() {
 #[tokio::test]
 async fn a_connection_over_its_share_is_for_probes_alone() {
     let (authority, files) = issued();
-    let service = Service::start(Some(&files), |config| {
+    let service = files.service(|config| {
         config.limits.client_connections = Some(1);
     });
     let service = service.await;
@@ -120,7 +119,7 @@ async fn an_address_makes_so_many_handshakes_a_second_and_others_do_not_wait_for
     const AT_ONCE: usize = 64;
     const A_SECOND: usize = 25;
     let (authority, files) = issued();
-    let service = Service::start(Some(&files), |_| ()).await;
+    let service = files.service(|_| ()).await;
     let (connector, address) = (trusting(&authority.root, &[]), service.address);
     let started = Instant::now();
     for _ in 0..AT_ONCE + 2 * A_SECOND {
@@ -147,7 +146,7 @@ async fn an_address_makes_so_many_handshakes_a_second_and_others_do_not_wait_for
 #[tokio::test]
 async fn a_handshake_does_not_hold_up_the_end() {
     let (_, files) = issued();
-    let service = Service::start(Some(&files), |config| {
+    let service = files.service(|config| {
         config.header_timeout = Duration::from_secs(600);
         config.shutdown_timeout = Duration::from_secs(600);
     });
@@ -160,7 +159,7 @@ async fn a_handshake_does_not_hold_up_the_end() {
 #[tokio::test]
 async fn a_client_that_never_reads_loses_its_connection() {
     let (authority, files) = issued();
-    let service = Service::start(Some(&files), |config| {
+    let service = files.service(|config| {
         config.limits.write_timeout = Duration::from_millis(100);
     });
     let service = service.await;

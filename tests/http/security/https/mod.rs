@@ -5,5 +5,4 @@ mod client;
 mod curl;
 mod hostile;
 mod program;
-mod service;
 mod session;

@@ -2,7 +2,7 @@
 
 use super::certificates::{Authority, kinds};
 use super::client::{Client, trusting};
-use super::service::Service;
+use crate::application::TestApplication;
 use bagtrack_testing::picture_files as pictures;
 use futures_util::{SinkExt, StreamExt};
 use image::{DynamicImage, ImageFormat};
@@ -46,7 +46,7 @@ async fn track<S: AsyncRead + AsyncWrite + Unpin>(client: &mut Client<S>) -> (St
 }
 
 async fn plain_answers() -> Vec<Value> {
-    let plain = Service::start(None, |_| ()).await;
+    let plain = TestApplication::start().await;
     let mut client = Client(TcpStream::connect(plain.address).await.unwrap());
     let (_, answers) = track(&mut client).await;
     assert!(plain.end().await);
@@ -59,7 +59,7 @@ async fn a_session_has_the_boxes_that_it_has_without_tls_whatever_the_key_is() {
     assert_eq!(expected.len(), FRAMES);
     for (kind, algorithm) in kinds() {
         let files = authority.issue(algorithm);
-        let service = Service::start(Some(&files), |_| ()).await;
+        let service = files.service(|_| ()).await;
         for offered in [&["h2", "http/1.1"][..], &[]] {
             let connector = trusting(&authority.root, offered);
             let mut client = Client::open(&connector, service.address).await;
@@ -98,7 +98,7 @@ async fn stream_answers(authority: &Authority, address: SocketAddr, id: &str) ->
 async fn a_stream_goes_over_tls() {
     let authority = Authority::new();
     let files = authority.issue(kinds()[0].1);
-    let service = Service::start(Some(&files), |_| ()).await;
+    let service = files.service(|_| ()).await;
     let mut client = Client::open(&trusting(&authority.root, &[]), service.address).await;
     let first = &frames()[0];
     let created = client
@@ -116,7 +116,7 @@ async fn a_stream_goes_over_tls() {
 async fn who_speaks_plain_http_is_sent_to_https() {
     let authority = Authority::new();
     let files = authority.issue(kinds()[0].1);
-    let service = Service::start(Some(&files), |_| ()).await;
+    let service = files.service(|_| ()).await;
     let mut client = Client(TcpStream::connect(service.address).await.unwrap());
     let answer = client.call("GET", "/docs/?a=b", b"").await;
     assert_eq!(answer.status(), "307", "{}", answer.head);
@@ -142,7 +142,7 @@ async fn who_speaks_plain_http_is_sent_to_https() {
 async fn who_does_not_know_the_issuer_says_so_and_the_service_goes_on() {
     let (authority, stranger) = (Authority::new(), Authority::new());
     let files = authority.issue(kinds()[0].1);
-    let service = Service::start(Some(&files), |_| ()).await;
+    let service = files.service(|_| ()).await;
     let refused = Client::try_open(&trusting(&stranger.root, &[]), service.address).await;
     let message = refused.err().expect("another root").to_string();
     assert!(message.contains("invalid peer certificate"), "{message}");
