@@ -2,6 +2,7 @@
 
 use crate::pictures;
 use image::ImageFormat;
+use serde_json::Value;
 use std::io::Write;
 use std::process::{Command, Stdio};
 
@@ -47,6 +48,13 @@ pub fn pattern(extension: &str, pictures: u32, arguments: &str) -> Vec<u8> {
 pub fn motion_jpeg() -> Vec<u8> {
     let frames = (1..=FRAMES).map(|t| pictures::encode(pictures::scene(t), ImageFormat::Jpeg));
     frames.flatten().collect()
+}
+
+/// The box of an answer is on the target of drawn frame `t`.
+#[track_caller]
+pub fn expect_on_target(answer: &Value, t: u32) {
+    let x = answer["box"]["x"].as_f64().unwrap();
+    assert!((x - f64::from(20 + 2 * t)).abs() < 3.0, "{t}: {answer}");
 }
 
 /// What begins as an MP4 file does, and has nothing in it.

@@ -1,8 +1,7 @@
 //! The process that decodes videos: what it may do, and where it is found.
 
-use crate::application::{BOX, expect};
+use crate::application::BOX;
 use crate::helpers::video_files::{FRAMES, video};
-use crate::pictures;
 use crate::program::{Program, serve};
 use crate::requests::lines::lines;
 use reqwest::Client;
@@ -64,23 +63,4 @@ async fn a_program_whose_file_was_removed_decodes_videos() {
     let answer = client.post(url).body(video("mp4")).send().await.unwrap();
     assert_eq!(answer.status(), 200);
     assert_eq!(lines(answer).await.len(), FRAMES as usize);
-}
-
-#[tokio::test]
-#[ignore = "needs ffmpeg"]
-async fn the_program_decodes_a_video_with_few_rights_and_without_ffmpeg_says_so() {
-    for (program, status) in [("ffmpeg", 200), ("/nowhere/ffmpeg", 415)] {
-        let (service, client) = (Program::start(&["--ffmpeg", program], &[]), Client::new());
-        let create = client.post(service.url(&format!("/sessions?box={BOX}")));
-        let created = create.body(pictures::png(0)).send().await.unwrap();
-        let created = expect(created, reqwest::StatusCode::CREATED).await;
-        let url = format!("/sessions/{}/frames", created["id"].as_str().unwrap());
-        // Its index is at the end, so the decoder goes back in it.
-        let post = client.post(service.url(&url)).body(video("mp4"));
-        let answer = post.send().await.unwrap();
-        assert_eq!(answer.status(), status);
-        if status == 200 {
-            assert_eq!(lines(answer).await.len(), FRAMES as usize);
-        }
-    }
 }

@@ -1,8 +1,12 @@
 //! Videos as bodies. Most need ffmpeg.
 
-use crate::application::{BOX, TestApplication, behind_a_proxy, expect, expect_problem};
+use crate::application::{
+    BOX, TestApplication, behind_a_proxy, expect, expect_detail, expect_problem,
+};
 use crate::helpers::heavy;
-use crate::helpers::video_files::{FRAMES, empty_mp4, made, motion_jpeg, pattern, video};
+use crate::helpers::video_files::{
+    FRAMES, empty_mp4, expect_on_target, made, motion_jpeg, pattern, video,
+};
 use crate::pictures;
 use crate::requests::lines::lines;
 use bagtrack_sessions::KEPT_ANSWERS;
@@ -37,11 +41,7 @@ async fn a_video_is_tracked_and_answered_line_by_line() {
         assert_eq!(answers.len(), FRAMES as usize, "{media_type}: {answers:?}");
         for (answer, t) in answers.iter().zip(1..) {
             assert_eq!(answer["frame"], t);
-            let x = answer["box"]["x"].as_f64().unwrap();
-            assert!(
-                (x - f64::from(20 + 2 * t)).abs() < 3.0,
-                "{media_type}: {answer}"
-            );
+            expect_on_target(answer, t);
         }
         assert_eq!(app.frames_of(&id).await, u64::from(FRAMES) + 1);
     }
@@ -88,13 +88,12 @@ async fn without_ffmpeg_a_video_is_refused_and_the_session_unchanged() {
         let app = TestApplication::start_with(|config| config.limits.ffmpeg = program.to_owned());
         let app = app.await;
         let id = app.open().await;
-        let refused = post(&app, &id, "video/mp4", empty_mp4()).await;
-        let problem = expect_problem(refused, "unsupported-image").await;
-        assert_eq!(problem["status"], 415);
-        assert!(
-            problem["detail"].as_str().unwrap().contains("ffmpeg"),
-            "{problem}"
-        );
+        let track = app.request(Method::POST, "/track", &[("box", BOX)]);
+        let track = track.header("content-type", "video/mp4").body(empty_mp4());
+        let frames = post(&app, &id, "video/mp4", empty_mp4()).await;
+        for refused in [frames, track.send().await.unwrap()] {
+            expect_detail(refused, "unsupported-image", &["ffmpeg"]).await;
+        }
         assert_eq!(app.frames_of(&id).await, 1);
     }
 }
@@ -114,14 +113,12 @@ async fn a_video_comes_back_frame_by_frame() {
         let answers = lines(post(&app, &id, "video/x-motion-jpeg", bytes.to_vec()).await).await;
         assert_eq!(answers.len(), FRAMES as usize, "{extension}");
         for (answer, t) in answers.iter().zip(1..) {
-            let x = answer["box"]["x"].as_f64().unwrap();
-            assert!((x - f64::from(20 + 2 * t)).abs() < 3.0, "{answer}");
+            expect_on_target(answer, t);
         }
     }
     let request = app.request(Method::POST, "/frames", &[]);
     let refused = request.body(pictures::png(1)).send().await.unwrap();
-    let problem = expect_problem(refused, "unsupported-image").await;
-    assert!(problem["detail"].as_str().unwrap().contains("Send a video"));
+    expect_detail(refused, "unsupported-image", &["Send a video"]).await;
     let request = app.request(Method::POST, "/frames", &[]);
     expect_problem(
         request.body(empty_mp4()).send().await.unwrap(),
@@ -187,15 +184,8 @@ async fn frames_of_a_damaged_video_end_before_the_damage_and_the_answer_is_cut_o
 async fn a_session_is_opened_with_a_picture() {
     let app = TestApplication::start().await;
     let gif = [b"GIF89a".to_vec(), vec![0; 400]].concat();
-    let problem = expect_problem(
-        app.create(gif.clone(), &[("box", BOX)]).await,
-        "unsupported-image",
-    );
-    let detail = problem.await["detail"].as_str().unwrap().to_owned();
-    assert!(
-        detail.contains("/frames") && detail.contains("picture"),
-        "{detail}"
-    );
+    let opening = app.create(gif.clone(), &[("box", BOX)]).await;
+    expect_detail(opening, "unsupported-image", &["/frames", "picture"]).await;
     let id = app.open().await;
     let request = app.frames_request(&id, &[("draw", "")]);
     let drawn = request.body(gif).send().await.unwrap();
@@ -215,11 +205,8 @@ async fn what_is_wrong_with_a_video_is_told() {
     assert_eq!(app.frames_of(&id).await, 6);
     // The index is missing.
     let cut = whole[..whole.len() / 2].to_vec();
-    let problem = expect_problem(post(&app, &id, "video/mp4", cut).await, "frame-damaged").await;
-    assert!(
-        problem["detail"].as_str().unwrap().contains("video"),
-        "{problem}"
-    );
+    let damaged = post(&app, &id, "video/mp4", cut).await;
+    expect_detail(damaged, "frame-damaged", &["video"]).await;
     assert_eq!(app.frames_of(&id).await, 6);
     // A playlist is no video, whatever its label says.
     let playlist = b"#EXTM3U\n#EXTINF:1,\nfile:///etc/passwd\n".to_vec();
@@ -292,9 +279,8 @@ async fn why_a_video_is_not_read_is_told_with_its_cure() {
             "not packed",
         ),
     ] {
-        let problem = expect_problem(post(&app, &id, "", video).await, slug).await;
-        let detail = problem["detail"].as_str().unwrap();
-        assert!(detail.contains(words), "{words}: {detail}");
+        let refused = post(&app, &id, "", video).await;
+        let detail = expect_detail(refused, slug, &[words]).await;
         assert!(
             !detail.contains("frames before"),
             "there are none: {detail}"
@@ -462,11 +448,7 @@ async fn until_damage(app: &TestApplication, video: Vec<u8>) -> usize {
     let named = format!("from its picture {} on", got.len() + 1);
     assert!(detail.contains(&named), "{named}: {detail}");
     for (answer, t) in got.iter().zip(1..) {
-        let x = answer["box"]["x"].as_f64().unwrap();
-        assert!(
-            (x - f64::from(20 + 2 * t)).abs() < 3.0,
-            "frame {t}: {answer}"
-        );
+        expect_on_target(answer, t);
     }
     assert_eq!(app.frames_of(&id).await, 1 + got.len() as u64);
     got.len()
