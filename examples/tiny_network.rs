@@ -15,6 +15,5 @@ fn main() -> io::Result<()> {
         return Err(io::Error::other("usage: tiny_network FOLDER"));
     };
     fs::create_dir_all(&folder)?;
-    fs::write(folder.join("backbone.onnx"), tiny_network::backbone())?;
-    fs::write(folder.join("head.onnx"), tiny_network::head())
+    tiny_network::write(&folder).map(drop)
 }

@@ -3,9 +3,9 @@
 use crate::command::succeeds;
 use bagtrack_tracker::{Params, Preset};
 
-/// The lines of the long help after the flags, in words.
-fn listed(command: &str) -> Vec<Vec<String>> {
-    let help = succeeds(&[command, "--help"]);
+/// The lines of the long help of `track` after the flags, in words.
+fn listed() -> Vec<Vec<String>> {
+    let help = succeeds(&["track", "--help"]);
     let (_, list) = help
         .split_once("\nParameters for --set NAME=VALUE")
         .unwrap_or_else(|| panic!("no list of parameters:\n{help}"));
@@ -16,26 +16,24 @@ fn listed(command: &str) -> Vec<Vec<String>> {
 #[test]
 fn the_long_help_has_a_line_for_each_parameter() {
     let robust = serde_json::to_value(Preset::Robust.params()).unwrap();
-    for command in ["track"] {
-        let lines = listed(command);
-        assert_eq!(lines.len(), Params::TABLE.len(), "{command}: {lines:?}");
-        for (line, row) in lines.iter().zip(Params::TABLE) {
-            let allowed = match row.range {
-                Some((min, max)) => format!("{min} to {max}"),
-                None => "whole number".to_owned(),
-            };
-            let value = robust[row.name].as_f64().unwrap();
-            let expected = format!("{} {allowed} {value} {}", row.name, row.description);
-            let expected: Vec<&str> = expected.split_whitespace().collect();
-            assert_eq!(line, &expected, "{command}");
-        }
+    let lines = listed();
+    assert_eq!(lines.len(), Params::TABLE.len(), "{lines:?}");
+    for (line, row) in lines.iter().zip(Params::TABLE) {
+        let allowed = match row.range {
+            Some((min, max)) => format!("{min} to {max}"),
+            None => "whole number".to_owned(),
+        };
+        let value = robust[row.name].as_f64().unwrap();
+        let expected = format!("{} {allowed} {value} {}", row.name, row.description);
+        let expected: Vec<&str> = expected.split_whitespace().collect();
+        assert_eq!(line, &expected);
     }
 }
 
 #[test]
 fn the_list_says_what_the_default_preset_has() {
     let line = |name: &str| {
-        let lines = listed("track");
+        let lines = listed();
         let line = lines.iter().find(|line| line[0] == name);
         line.unwrap_or_else(|| panic!("{name} is missing"))
             .join(" ")
@@ -47,12 +45,10 @@ fn the_list_says_what_the_default_preset_has() {
 
 #[test]
 fn the_short_help_stays_short_and_points_to_the_long_one() {
-    for command in ["track"] {
-        let help = succeeds(&[command, "-h"]);
-        assert!(help.contains("`--help` lists the parameters"), "{help}");
-        for row in Params::TABLE.iter().filter(|row| row.name.contains('_')) {
-            assert!(!help.contains(row.name), "{command} -h names {}", row.name);
-        }
+    let help = succeeds(&["track", "-h"]);
+    assert!(help.contains("`--help` lists the parameters"), "{help}");
+    for row in Params::TABLE.iter().filter(|row| row.name.contains('_')) {
+        assert!(!help.contains(row.name), "it names {}", row.name);
     }
 }
 

@@ -1,6 +1,8 @@
 //! `bagtrack sample` and `bagtrack track`, as a person types them.
 
-use crate::command::{bagtrack, boxes, clip, fails, folder, rows, succeeds, text, track};
+use crate::command::{
+    bagtrack, boxes, clip, fails, folder, rows, sample_clip, succeeds, text, track,
+};
 use bagtrack_tracker::Rect;
 use serde_json::Value;
 use std::fs;
@@ -95,8 +97,7 @@ fn sample_says_which_setting_is_wrong() {
 
 #[test]
 fn track_starts_at_the_given_box_and_gives_one_line_a_frame() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
+    let (_parent, dir) = sample_clip();
     let given = |frames: &Path, more: &str| {
         let flags = format!("--format csv --box 44.1,101.4,46.1,57.6 {more}");
         succeeds(&track(frames, &flags))
@@ -117,8 +118,7 @@ fn track_starts_at_the_given_box_and_gives_one_line_a_frame() {
 
 #[test]
 fn track_takes_the_first_annotated_box_and_counts_from_zero() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
+    let (_parent, dir) = sample_clip();
     let truth = fs::read_to_string(dir.join("groundtruth_rect.txt")).expect("it was written");
     let [x, y, width, height] = boxes(&truth)[0];
     let tracked = rows(&succeeds(&["track", text(&dir), "--format", "csv"]));
@@ -139,8 +139,7 @@ fn track_takes_the_first_annotated_box_and_counts_from_zero() {
 
 #[test]
 fn track_gives_json_lines() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
+    let (_parent, dir) = sample_clip();
     let lines = succeeds(&["track", text(&dir), "--format", "json", "--preset", "paper"]);
     let mut count = 0;
     for (index, line) in lines.lines().enumerate() {
@@ -168,8 +167,7 @@ fn track_gives_json_lines() {
 
 #[test]
 fn track_draws_the_box_and_nothing_else() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
+    let (parent, dir) = sample_clip();
     let out = parent.path().join("drawn");
     succeeds(&track(
         &dir,
@@ -199,8 +197,7 @@ fn track_draws_the_box_and_nothing_else() {
 
 #[test]
 fn track_warns_of_a_box_that_may_be_two_corners_and_goes_on() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
+    let (_parent, dir) = sample_clip();
     let said = |given: &str| {
         let output = bagtrack(&["track", text(&dir), "--box", given]);
         assert!(output.status.success(), "{output:?}");
@@ -216,8 +213,7 @@ fn track_warns_of_a_box_that_may_be_two_corners_and_goes_on() {
 
 #[test]
 fn track_says_in_one_line_what_is_wrong() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
+    let (parent, dir) = sample_clip();
     let line = fails(&track(&parent.path().join("nowhere"), "--box 1,2,3,4"));
     assert!(line.contains("nowhere"), "{line}");
     let line = fails(&["track", text(&dir.join("img"))]);

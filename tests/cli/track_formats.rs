@@ -1,6 +1,6 @@
 //! How `bagtrack track` writes boxes: formats, several targets, files.
 
-use crate::command::{Row, boxes, clip, fails, folder, rows, succeeds, text, track};
+use crate::command::{Row, boxes, fails, rows, sample_clip, succeeds, text, track};
 use bagtrack_cli::parse_boxes;
 use serde_json::Value;
 use std::fs;
@@ -15,8 +15,7 @@ fn areas(rows: &[Row], target: usize) -> Vec<[f64; 4]> {
 
 #[test]
 fn the_default_is_a_table_with_score_and_status() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
+    let (_parent, dir) = sample_clip();
     let table = succeeds(&["track", text(&dir), ONE]);
     let lines: Vec<Vec<&str>> = table
         .lines()
@@ -49,8 +48,7 @@ fn the_default_is_a_table_with_score_and_status() {
 /// A table was written into them.
 #[test]
 fn the_name_of_the_file_says_its_format() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
+    let (parent, dir) = sample_clip();
     for (name, format) in [
         ("boxes.csv", "csv"),
         ("boxes.jsonl", "json"),
@@ -75,8 +73,7 @@ fn the_name_of_the_file_says_its_format() {
 
 #[test]
 fn otb_and_mot_count_from_one() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
+    let (_parent, dir) = sample_clip();
     let flags = ["track", text(&dir), ONE, "--start", "2", "--format"];
     let csv = rows(&succeeds(&[&flags[..], &["csv"]].concat()));
     let otb = succeeds(&[&flags[..], &["otb"]].concat());
@@ -100,8 +97,7 @@ fn otb_and_mot_count_from_one() {
 
 #[test]
 fn several_targets_are_followed_as_each_would_be_in_a_session() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
+    let (_parent, dir) = sample_clip();
     let flags = ["track", text(&dir), "--seed", "5", "--format"];
     let both = rows(&succeeds(&[&flags[..], &["csv", ONE, OTHER]].concat()));
     let order: Vec<(u64, usize)> = both.iter().map(|row| (row.frame, row.target)).collect();
@@ -134,8 +130,7 @@ fn several_targets_are_followed_as_each_would_be_in_a_session() {
 
 #[test]
 fn too_many_targets_and_a_format_without_them_are_refused() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
+    let (_parent, dir) = sample_clip();
     let sixteen = [ONE; 16];
     let flags = ["track", text(&dir), "--format", "csv", "--start", "11"];
     let found = rows(&succeeds(&[&flags[..], &sixteen].concat()));
@@ -159,8 +154,7 @@ fn too_many_targets_and_a_format_without_them_are_refused() {
 
 #[test]
 fn boxes_go_to_a_new_file() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
+    let (parent, dir) = sample_clip();
     let file = parent.path().join("boxes.csv");
     let flags = ["track", text(&dir), "--format", "csv"];
     // What fails before the first row leaves no file that would be in the way.
@@ -195,8 +189,7 @@ fn attribute<'a>(line: &'a str, name: &str) -> &'a str {
 
 #[test]
 fn documents_of_annotation_tools_tell_the_boxes_of_the_others() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
+    let (_parent, dir) = sample_clip();
     let flags = ["track", text(&dir), ONE, OTHER, "--name", "a \"<dog>\""];
     let csv = rows(&succeeds(&[&flags[..4], &["--format", "csv"]].concat()));
     let made = |format| succeeds(&[&flags[..], &["--format", format]].concat());
@@ -252,8 +245,7 @@ fn documents_of_annotation_tools_tell_the_boxes_of_the_others() {
 
 #[test]
 fn a_part_of_a_clip_ends_where_it_was_tracked_to() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
+    let (_parent, dir) = sample_clip();
     let flags = ["track", text(&dir), ONE, "--start", "2", "--frames", "5"];
     let cvat = succeeds(&[&flags[..], &["--format", "cvat"]].concat());
     let last = cvat.lines().rfind(|it| it.starts_with("<box"));
@@ -282,8 +274,7 @@ fn a_part_of_a_clip_ends_where_it_was_tracked_to() {
 
 #[test]
 fn labels_of_yolo_go_to_a_new_folder() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
+    let (parent, dir) = sample_clip();
     let flags = ["track", text(&dir), ONE, OTHER, "--format", "yolo"];
     assert!(fails(&flags).contains("-o DIR"));
     let out = parent.path().join("labels");
@@ -316,8 +307,7 @@ fn labels_of_yolo_go_to_a_new_folder() {
 
 #[test]
 fn targets_of_one_name_are_one_class() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
+    let (parent, dir) = sample_clip();
     let flags = format!("{ONE} {OTHER} --name a --name a");
     let flags = track(&dir, &flags);
     let out = parent.path().join("labels");

@@ -1,26 +1,22 @@
 //! `bagtrack track --model`: a second opinion by a network that the user gives.
 
-use crate::command::{bagtrack, clip, fails, folder, succeeds, text};
+use crate::command::{bagtrack, fails, sample_clip, succeeds, text};
 use bagtrack_testing::tiny_network;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use tempfile::TempDir;
 
 const ONE: &str = "--box=44.1,101.4,46.1,57.6";
 
-/// The two files of a network in `folder`.
-fn network(folder: &Path) -> [PathBuf; 2] {
-    let files = [folder.join("backbone.onnx"), folder.join("head.onnx")];
-    fs::write(&files[0], tiny_network::backbone()).unwrap();
-    fs::write(&files[1], tiny_network::head()).unwrap();
-    files
+/// A folder, the sample clip in it, and the flag that names a network there.
+fn clip_and_model() -> (TempDir, PathBuf, String) {
+    let (parent, dir) = sample_clip();
+    let model = tiny_network::write(parent.path()).expect("the folder is writable");
+    (parent, dir, format!("--model={model}"))
 }
 
 #[test]
 fn a_network_has_a_part_in_the_boxes_and_leaves_none_without_it() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
-    let [backbone, head] = network(parent.path());
-    let model = format!("--model=nanotrack:{},{}", text(&backbone), text(&head));
+    let (_parent, dir, model) = clip_and_model();
     let with = succeeds(&["track", text(&dir), ONE, &model]);
     let without = succeeds(&["track", text(&dir), ONE]);
     assert_ne!(with, without);
@@ -30,10 +26,7 @@ fn a_network_has_a_part_in_the_boxes_and_leaves_none_without_it() {
 
 #[test]
 fn a_network_for_doubt_leaves_the_sure_frames_as_they_are() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
-    let [backbone, head] = network(parent.path());
-    let model = format!("--model=nanotrack:{},{}", text(&backbone), text(&head));
+    let (_parent, dir, model) = clip_and_model();
     let track = ["track", text(&dir), ONE];
     let in_doubt = succeeds(&[&track[..], &[&model, "--model-in-doubt"]].concat());
     let always = succeeds(&[&track[..], &[&model]].concat());
@@ -59,10 +52,11 @@ fn a_network_for_doubt_leaves_the_sure_frames_as_they_are() {
 
 #[test]
 fn a_network_that_cannot_be_used_is_told_before_a_frame_is_tracked() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", &[]);
-    let [backbone, head] = network(parent.path());
-    let (backbone, head) = (text(&backbone), text(&head));
+    let (_parent, dir, model) = clip_and_model();
+    let files = model.strip_prefix("--model=nanotrack:");
+    let (backbone, head) = files
+        .and_then(|files| files.split_once(','))
+        .expect("two files");
     let refusal = |model: &str| fails(&["track", text(&dir), ONE, "--model", model]);
     let missing = refusal(&format!("nanotrack:{backbone}.gone,{head}"));
     assert!(missing.contains("backbone.onnx.gone"), "{missing}");
@@ -74,8 +68,7 @@ fn a_network_that_cannot_be_used_is_told_before_a_frame_is_tracked() {
     );
     let refused = refusal(&no_network);
     assert!(refused.contains("not an ONNX file"), "{refused}");
-    let paper = ["track", text(&dir), ONE, "--preset=paper", "--model"];
-    let model = format!("nanotrack:{backbone},{head}");
+    let paper = ["track", text(&dir), ONE, "--preset=paper"];
     let refused = fails(&[&paper[..], &[&model]].concat());
     assert!(refused.contains("robust"), "{refused}");
 }

@@ -43,6 +43,13 @@ pub fn failure(name: &str, output: Output) -> String {
     errors
 }
 
+/// A folder, and the sample clip in it.
+pub fn sample_clip() -> (TempDir, PathBuf) {
+    let parent = folder();
+    let dir = clip(parent.path(), "clip", &[]);
+    (parent, dir)
+}
+
 pub fn bagtrack(args: &[&str]) -> Output {
     run("bagtrack", args)
 }

@@ -2,6 +2,21 @@
 //! 16 x 16 pixels by their mean colour, the head finds where the middle of the target's description fits best. The box keeps
 //! its size.
 
+use std::path::Path;
+use std::{fs, io};
+
+/// Writes the network's two files into a folder; gives the setting that names them.
+///
+/// # Errors
+/// The folder takes no files.
+pub fn write(folder: &Path) -> io::Result<String> {
+    let [backbone, head] = ["backbone.onnx", "head.onnx"].map(|name| folder.join(name));
+    fs::write(&backbone, self::backbone())?;
+    fs::write(&head, self::head())?;
+    let setting = format!("nanotrack:{},{}", backbone.display(), head.display());
+    Ok(setting)
+}
+
 /// The ONNX file of the backbone: a picture to its mean colours x, and -|x|²/2 beside them.
 pub fn backbone() -> Vec<u8> {
     const SIDE: usize = 15;

@@ -5,15 +5,11 @@ use crate::pictures;
 use bagtrack_testing::tiny_network;
 use reqwest::StatusCode;
 use serde_json::Value;
-use std::fs;
 use std::path::Path;
 
 /// A service with the network in `folder`, asked always or in doubt alone.
 async fn with_network(folder: &Path, in_doubt: bool) -> TestApplication {
-    let [backbone, head] = ["backbone.onnx", "head.onnx"].map(|name| folder.join(name));
-    fs::write(&backbone, tiny_network::backbone()).unwrap();
-    fs::write(&head, tiny_network::head()).unwrap();
-    let model = format!("nanotrack:{},{}", backbone.display(), head.display());
+    let model = tiny_network::write(folder).unwrap();
     TestApplication::start_with(|config| {
         config.model = Some(model.parse().expect("two files"));
         config.model_in_doubt = in_doubt;

@@ -14,13 +14,7 @@ use std::sync::Arc;
 fn a_network_has_a_part_in_the_figures() {
     let parent = folder();
     let one = clip(parent.path(), "one", 1, 12);
-    let files = [
-        parent.path().join("backbone.onnx"),
-        parent.path().join("head.onnx"),
-    ];
-    fs::write(&files[0], tiny_network::backbone()).unwrap();
-    fs::write(&files[1], tiny_network::head()).unwrap();
-    let model = format!("nanotrack:{},{}", text(&files[0]), text(&files[1]));
+    let model = tiny_network::write(parent.path()).unwrap();
     let overlap = |args: &[&str]| {
         let json = succeeds(&[&[text(&one), "--format", "json"], args].concat());
         let report: Value = serde_json::from_str(&json).expect("it is JSON");
@@ -28,7 +22,7 @@ fn a_network_has_a_part_in_the_figures() {
     };
     let (with, without) = (overlap(&["--model", &model]), overlap(&[]));
     assert!(with != without && with > 0.3, "{with} {without}");
-    let missing = format!("nanotrack:{},{}.gone", text(&files[0]), text(&files[1]));
+    let missing = format!("{model}.gone");
     let refused = fails(&[text(&one), "--model", &missing]);
     assert!(refused.contains("head.onnx.gone"), "{refused}");
 }
