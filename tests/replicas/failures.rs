@@ -17,24 +17,7 @@ async fn until_ready(replica: &Replica, status: StatusCode) {
     while replica.readiness().await != status {}
 }
 
-#[tokio::test]
-#[ignore = "needs redis"]
-async fn after_the_end_of_a_replica_the_frames_after_the_checkpoint_are_asked_for() {
-    let mut pair = Pair::open(&["--store-every", "10"], 30).await;
-    let expected = pair.undisturbed().await;
-    for number in 1..=25 {
-        let answer = pair.post(0, number).await;
-        let stored = (number / 10 * 10).to_string();
-        assert_eq!(checkpoint(&answer), Some(&*stored), "frame {number}");
-        assert_eq!(json(answer, StatusCode::OK).await, expected[number - 1]);
-    }
-    pair.replicas[0].kill();
-    let refused = json(pair.post(1, 26).await, StatusCode::CONFLICT).await;
-    assert_eq!(refused["expected_frame"], 21);
-    pair.follow(1, 21..30, &expected).await;
-}
-
-/// The same with the Rust client, which keeps those frames and sends them again.
+/// After the end of a replica: the Rust client keeps those frames.
 #[tokio::test]
 #[ignore = "needs redis"]
 async fn the_client_sends_the_frames_after_the_checkpoint_again() {
@@ -105,24 +88,4 @@ async fn a_frame_that_comes_late_to_another_replica_takes_nothing_back() {
     }
     let next = json(pair.post(0, 15).await, StatusCode::OK).await;
     assert_eq!(next["frame"], 15);
-}
-
-#[tokio::test]
-#[ignore = "needs redis"]
-async fn without_the_store_frames_are_refused_and_nothing_is_lost() {
-    let mut pair = Pair::open(&["--store-timeout", "2s"], 12).await;
-    let expected = pair.undisturbed().await;
-    pair.take(0, 1..6).await;
-    assert_eq!(pair.replicas[0].readiness().await, StatusCode::OK);
-    pair.redis.stop();
-    for _ in 0..3 {
-        let refused = pair.post(0, 6).await;
-        assert!(refused.headers().contains_key("retry-after"));
-        let problem = json(refused, StatusCode::SERVICE_UNAVAILABLE).await;
-        assert_eq!(problem["type"], "/docs/problems#store-unavailable");
-    }
-    until_ready(&pair.replicas[0], StatusCode::SERVICE_UNAVAILABLE).await;
-    pair.redis.start_again();
-    until_ready(&pair.replicas[0], StatusCode::OK).await;
-    pair.follow(0, 6..12, &expected).await;
 }

@@ -62,18 +62,3 @@ async fn an_id_that_another_owner_has_now_is_found_where_the_old_session_was() {
         json(post(&second).await, StatusCode::OK).await;
     }
 }
-
-#[tokio::test]
-#[ignore = "needs redis"]
-async fn a_session_is_ended_once() {
-    let pair = Pair::open(&[], 3).await;
-    json(pair.post(1, 1).await, StatusCode::OK).await;
-    let end = async |replica: usize| {
-        let request = pair.client.delete(pair.url(replica, ""));
-        request.send().await.unwrap().status()
-    };
-    assert_eq!(end(1).await, StatusCode::NO_CONTENT);
-    for replica in [0, 1] {
-        assert_eq!(end(replica).await, StatusCode::NOT_FOUND);
-    }
-}

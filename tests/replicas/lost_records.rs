@@ -50,20 +50,6 @@ async fn a_lost_session_goes_on_from_its_snapshot_under_the_same_id() {
 
 #[tokio::test]
 #[ignore = "needs redis"]
-async fn a_session_that_was_ended_does_not_come_back() {
-    let pair = Pair::open(&[], 4).await;
-    json(pair.post(0, 1).await, StatusCode::OK).await;
-    json(pair.post(1, 2).await, StatusCode::OK).await;
-    let ended = pair.client.delete(pair.url(0, "")).send().await.unwrap();
-    assert_eq!(ended.status(), StatusCode::NO_CONTENT);
-    // The second replica has the state that the frame follows.
-    json(pair.post(1, 3).await, StatusCode::NOT_FOUND).await;
-    json(pair.post(0, 3).await, StatusCode::NOT_FOUND).await;
-    json(pair.view(1).await, StatusCode::NOT_FOUND).await;
-}
-
-#[tokio::test]
-#[ignore = "needs redis"]
 async fn the_stream_of_a_lost_session_ends_and_says_why() {
     let pair = Pair::open(&[], 4).await;
     let mut stream = StreamClient::open_in_time(pair.replicas[0].address, pair.id, "").await;

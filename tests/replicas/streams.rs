@@ -6,7 +6,6 @@ use reqwest::StatusCode;
 use serde_json::Value;
 use std::time::Duration;
 use tokio::time::timeout;
-use uuid::Uuid;
 
 /// The replica to which a stream went that a newer one replaced.
 const REPLACED: u16 = 4409;
@@ -127,22 +126,4 @@ async fn a_stream_that_says_nothing_ends_with_its_session_and_with_a_newer_strea
     let problem = other.message().await;
     assert_eq!(problem["type"], "/docs/problems#session-not-found");
     assert_eq!(other.receive().await, Received::Closed(4404));
-}
-
-#[tokio::test]
-#[ignore = "needs redis"]
-async fn the_picture_of_the_bag_is_the_same_at_both_replicas() {
-    let pair = Pair::open(&[], 6).await;
-    pair.take(0, 1..6).await;
-    let mut pictures = Vec::new();
-    for replica in 0..2 {
-        let answer = pair.client.get(pair.url(replica, "/bag.png")).send().await;
-        let answer = answer.unwrap();
-        assert_eq!(answer.status(), StatusCode::OK);
-        pictures.push(answer.bytes().await.unwrap());
-    }
-    assert_eq!(pictures[0], pictures[1]);
-    let unknown = pair.replicas[1].url(&format!("/sessions/{}/bag.png", Uuid::new_v4()));
-    let unknown = pair.client.get(unknown).send().await.unwrap();
-    json(unknown, StatusCode::NOT_FOUND).await;
 }
