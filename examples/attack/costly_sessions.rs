@@ -1,9 +1,9 @@
 //! Sessions with the most expensive parameters, and as many frames in each request as are taken.
 
+use crate::decode_bombs::form;
 use crate::good::{GoodClients, frames};
 use crate::target::Target;
 use crate::{Options, Outcome, Verdict};
-use reqwest::multipart::{Form, Part};
 use std::time::Instant;
 use tokio::task::JoinSet;
 
@@ -24,10 +24,8 @@ pub async fn attack(target: &Target, options: &Options) -> Outcome<Verdict> {
         attackers.spawn(async move {
             let mut sent = 0u32;
             while Instant::now() < end {
-                let part = || Part::bytes(frame.clone()).file_name("frame.jpg");
-                let form = (0..64).fold(Form::new(), |form, _| form.part("frame", part()));
                 let request = http.post(&url).header("x-forwarded-for", &client);
-                let _ = request.multipart(form).send().await;
+                let _ = request.multipart(form(&frame, 64)).send().await;
                 sent += 1;
             }
             sent

@@ -17,9 +17,9 @@ pub fn bomb() -> Outcome<Vec<u8>> {
     Ok(bytes.into_inner())
 }
 
-/// A form with so many of them.
-pub fn form(bomb: &[u8], count: usize) -> Form {
-    let part = || Part::bytes(bomb.to_vec()).file_name("frame.webp");
+/// A form with a picture so many times.
+pub fn form(picture: &[u8], count: usize) -> Form {
+    let part = || Part::bytes(picture.to_vec()).file_name("frame");
     (0..count).fold(Form::new(), |form, _| form.part("frame", part()))
 }
 

@@ -12,7 +12,6 @@
 
 mod costly_sessions;
 mod decode_bombs;
-mod garbage;
 mod good;
 mod greedy_client;
 mod idle_streams;
@@ -117,7 +116,6 @@ async fn main() -> ExitCode {
         costly_sessions,
         idle_streams,
         greedy_client,
-        garbage,
         json_copies,
         random_clients
     );
