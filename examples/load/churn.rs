@@ -1,7 +1,7 @@
 //! Sessions that come and go for a long time: does the server's resident memory stay where it was?
 
 use crate::Outcome;
-use crate::drive::{Driver, Failure};
+use crate::drive::Driver;
 use crate::process::Server;
 use bagtrack_client::ClientError;
 use std::time::Duration;
@@ -44,7 +44,7 @@ pub async fn run(
     let last = resident(server, reading).await?;
     let (mut opened, mut sent) = (0, 0);
     while let Some(client) = clients.join_next().await {
-        let (sessions, frames) = client?.map_err(|failure| failure.to_string())?;
+        let (sessions, frames) = client??;
         (opened, sent) = (opened + sessions, sent + frames);
     }
     let change = last / first - 1.0;
@@ -79,7 +79,7 @@ struct ChurningClient {
 
 impl ChurningClient {
     /// Returns how many sessions it opened, and how many frames they took.
-    async fn run(self, number: u32, end: Instant) -> Result<(u32, u32), Failure> {
+    async fn run(self, number: u32, end: Instant) -> Outcome<(u32, u32)> {
         let (mut opened, mut sent) = (0, 0);
         let mut due = interval(self.every);
         due.set_missed_tick_behavior(MissedTickBehavior::Delay);

@@ -11,9 +11,6 @@ use tokio::time::{Instant, sleep_until};
 
 use crate::Outcome;
 
-/// A failure that can pass between tasks.
-pub type Failure = Box<dyn std::error::Error + Send + Sync>;
-
 /// The results of the runs.
 pub struct Done {
     /// Of each frame that was answered, in microseconds; in an open loop from when the frame was due.
@@ -54,24 +51,13 @@ impl Driver {
         target: Rect,
         preset: bagtrack_tracker::Preset,
     ) -> Self {
-        let Rect {
-            x,
-            y,
-            width,
-            height,
-        } = target;
         let preset = match preset {
             bagtrack_tracker::Preset::Robust => Preset::Robust,
             bagtrack_tracker::Preset::Paper => Preset::Paper,
         };
         Self {
             url: url.to_owned(),
-            target: bagtrack_client::Rect {
-                x,
-                y,
-                width,
-                height,
-            },
+            target: [target.x, target.y, target.width, target.height].into(),
             options: OpenOptions::new().preset(preset),
             pictures: pictures.into_iter().map(Bytes::from).collect(),
         }
@@ -83,13 +69,7 @@ impl Driver {
 
     /// The address that opens a session.
     pub fn opening(&self) -> String {
-        let bagtrack_client::Rect {
-            x,
-            y,
-            width,
-            height,
-        } = self.target;
-        format!("{}/sessions?box={x},{y},{width},{height}", self.url)
+        format!("{}/sessions?box={}", self.url, self.target)
     }
 
     /// A client with so many connections. It sends every request once, so that a failure is seen and each latency is
@@ -144,7 +124,7 @@ impl Clients {
             tasks.spawn(client.run(own, schedule, start + limit));
         }
         while let Some(client) = tasks.join_next().await {
-            let (client, latencies) = client?.map_err(|failure| failure.to_string())?;
+            let (client, latencies) = client??;
             done.latencies.add(&latencies)?;
             self.0.push(client);
         }
@@ -179,7 +159,7 @@ impl ClientSession {
         frames: u32,
         schedule: Option<Schedule>,
         end: Instant,
-    ) -> Result<(Self, Histogram<u64>), Failure> {
+    ) -> Outcome<(Self, Histogram<u64>)> {
         let mut latencies = Histogram::new(3)?;
         for index in 0..frames {
             let due = match schedule {

@@ -41,7 +41,7 @@ const PARTS: u32 = 10;
 /// No server here gets through more in a second.
 const MOST_FRAMES: f64 = 2_000.0;
 
-type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+type Outcome<T> = Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
 #[derive(Debug, Parser)]
 struct Options {

@@ -8,7 +8,7 @@ use bagtrack_tracker::Preset;
 use tokio::task::JoinSet;
 
 use crate::Outcome;
-use crate::drive::{Driver, Failure};
+use crate::drive::Driver;
 use crate::process::Server;
 
 /// Numbers of sessions at which memory is read, besides the last.
@@ -32,7 +32,7 @@ pub async fn print(driver: &Driver, server: &Server, preset: Preset, sessions: u
         frames: 2 * (params.bag_size + params.history),
     });
     // One session first, so that memory allocated once by the first requests is not counted.
-    fill.one().await.map_err(|failure| failure.to_string())?;
+    fill.one().await?;
     let before = server.resident()?;
     println!("server: {} MiB resident with one session", before >> 20);
     println!("| live | resident MiB | KiB each |");
@@ -55,11 +55,11 @@ pub async fn print(driver: &Driver, server: &Server, preset: Preset, sessions: u
                 {
                     fill.one().await?;
                 }
-                Ok::<(), Failure>(())
+                Outcome::Ok(())
             });
         }
         while let Some(client) = clients.join_next().await {
-            client?.map_err(|failure| failure.to_string())?;
+            client??;
         }
         live = mark;
         let resident = server.resident()?;
@@ -77,7 +77,7 @@ struct Fill {
 
 impl Fill {
     /// Opens a session and fills its bag.
-    async fn one(&self) -> Result<(), Failure> {
+    async fn one(&self) -> Outcome<()> {
         let mut session = self.driver.session(&self.client).await?;
         let pictures = self.driver.pictures.iter().cycle().skip(1);
         for (_, picture) in (0..self.frames).zip(pictures) {

@@ -12,7 +12,7 @@ use tokio::task::JoinSet;
 use tokio::time::{Instant, sleep_until};
 
 use crate::Outcome;
-use crate::drive::{Done, Driver, Failure};
+use crate::drive::{Done, Driver};
 
 /// Frames a second of a camera.
 const RATE: f64 = 10.0;
@@ -32,7 +32,7 @@ struct Answers {
 }
 
 impl Answers {
-    fn new() -> Result<Self, Failure> {
+    fn new() -> Outcome<Self> {
         Ok(Self {
             latencies: Histogram::new(3)?,
             refused: 0,
@@ -41,7 +41,7 @@ impl Answers {
         })
     }
 
-    fn add(&mut self, other: &Self) -> Result<(), Failure> {
+    fn add(&mut self, other: &Self) -> Outcome<()> {
         self.latencies.add(&other.latencies)?;
         self.refused += other.refused;
         self.without_time += other.without_time;
@@ -74,21 +74,17 @@ async fn send(driver: &Driver, knee: f64, times: f64, length: Duration) -> Outco
     let cameras = (times * knee / RATE).ceil() as u32;
     let mut opened = Vec::new();
     for number in 0..cameras {
-        opened.push(
-            Camera::open(driver, number)
-                .await
-                .map_err(|failure| failure.to_string())?,
-        );
+        opened.push(Camera::open(driver, number).await?);
     }
     let begin = Instant::now() + Duration::from_millis(100);
     let mut running = JoinSet::new();
     for camera in opened {
         running.spawn(camera.run(begin, length));
     }
-    let mut all = Answers::new().map_err(|failure| failure.to_string())?;
+    let mut all = Answers::new()?;
     while let Some(camera) = running.join_next().await {
-        let answers = camera?.map_err(|failure| failure.to_string())?;
-        all.add(&answers).map_err(|failure| failure.to_string())?;
+        let answers = camera??;
+        all.add(&answers)?;
     }
     let answered = all.latencies.len();
     let per_second = answered as f64 / (length - WARM_UP).as_secs_f64();
@@ -117,7 +113,7 @@ struct Camera {
 }
 
 impl Camera {
-    async fn open(driver: &Driver, number: u32) -> Result<Self, Failure> {
+    async fn open(driver: &Driver, number: u32) -> Outcome<Self> {
         // A network for each client, so that they do not share.
         let client = number / OF_A_CLIENT;
         let address = format!("10.{}.{}.1", client / 256, client % 256);
@@ -149,7 +145,7 @@ impl Camera {
         })
     }
 
-    async fn run(self, begin: Instant, length: Duration) -> Result<Answers, Failure> {
+    async fn run(self, begin: Instant, length: Duration) -> Outcome<Answers> {
         let mut answers = Answers::new()?;
         let every = Duration::from_secs_f64(1.0 / RATE);
         // They do not all send at the same moment.
