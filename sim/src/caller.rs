@@ -352,25 +352,15 @@ fn sent(picture: usize) -> Sent {
 
 pub(crate) fn rect(clip: usize, picture: usize) -> Rect {
     let target = scenes::target(clip, picture);
-    Rect {
-        x: target.x,
-        y: target.y,
-        width: target.width,
-        height: target.height,
-    }
+    Rect::from([target.x, target.y, target.width, target.height])
 }
 
 fn text(answer: &Answer) -> String {
-    let Rect {
-        x,
-        y,
-        width,
-        height,
-    } = answer.first.rect;
+    let rect = answer.first.rect;
     let status = match answer.first.status {
         Status::Tracking => "tracking",
         Status::Uncertain => "uncertain",
         Status::Lost => "lost",
     };
-    replay::text([x, y, width, height], answer.first.score, status)
+    replay::text(rect, answer.first.score, status)
 }

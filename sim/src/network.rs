@@ -219,7 +219,7 @@ impl Wire {
 /// An answer in one line.
 pub(crate) fn text(answer: &serde_json::Value) -> String {
     let side = |name: &str| answer["box"][name].as_f64().unwrap_or(f64::NAN);
-    let rect = [side("x"), side("y"), side("width"), side("height")];
+    let rect = [side("x"), side("y"), side("width"), side("height")].into();
     let score = answer["score"].as_f64().unwrap_or(f64::NAN);
     replay::text(rect, score, answer["status"].as_str().unwrap_or_default())
 }

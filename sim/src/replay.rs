@@ -1,9 +1,9 @@
 //! The tracker alone: what the answers to the frames of a session must be.
 
 use crate::scenes;
-use bagtrack_client::OpenOptions;
+use bagtrack_client::{OpenOptions, Rect};
 use bagtrack_ingest::Limits;
-use bagtrack_tracker::{Estimate, Frame, Params, Preset, Rect, Status, Tracker};
+use bagtrack_tracker::{Estimate, Frame, Params, Preset, Status, Tracker};
 use std::cell::RefCell;
 use std::collections::HashMap;
 
@@ -100,25 +100,18 @@ fn decoded(clip: usize, picture: usize, params: &Params) -> Frame {
 
 /// An answer as the service rounds it: boxes to a hundredth of a pixel, scores to a thousandth.
 fn told(estimate: &Estimate) -> String {
-    let Rect {
-        x,
-        y,
-        width,
-        height,
-    } = estimate.target;
-    let [x, y, width, height] =
-        [x, y, width, height].map(|value| (value * 100.0).round() / 100.0 + 0.0);
+    let target = estimate.target;
+    let rect = Rect::from([target.x, target.y, target.width, target.height]).rounded();
     let score = (f64::from(estimate.score) * 1000.0).round() / 1000.0;
     let status = match estimate.status {
         Status::Tracking => "tracking",
         Status::Uncertain => "uncertain",
         Status::Lost => "lost",
     };
-    text([x, y, width, height], score, status)
+    text(rect, score, status)
 }
 
 /// An answer in one line.
-pub fn text(rect: [f64; 4], score: f64, status: &str) -> String {
-    let [x, y, width, height] = rect;
-    format!("{x},{y},{width},{height} {score:.3} {status}")
+pub fn text(rect: Rect, score: f64, status: &str) -> String {
+    format!("{rect} {score:.3} {status}")
 }

@@ -24,12 +24,7 @@ pub fn picture(clip: usize, index: usize) -> Bytes {
 
 pub fn target(clip: usize, index: usize) -> Rect {
     let (x, y) = corner(clip, index % PICTURES);
-    Rect {
-        x: f64::from(x),
-        y: f64::from(y),
-        width: f64::from(SIDE),
-        height: f64::from(SIDE),
-    }
+    Rect::new(x.into(), y.into(), SIDE.into(), SIDE.into())
 }
 
 fn corner(clip: usize, index: usize) -> (u32, u32) {

@@ -29,18 +29,8 @@ pub static CLIP: LazyLock<Clip> = LazyLock::new(|| {
 impl Clip {
     /// The box in the first frame.
     pub fn rect(&self) -> bagtrack_client::Rect {
-        let Rect {
-            x,
-            y,
-            width,
-            height,
-        } = self.target;
-        bagtrack_client::Rect {
-            x,
-            y,
-            width,
-            height,
-        }
+        let Rect { x, y, .. } = self.target;
+        [x, y, self.target.width, self.target.height].into()
     }
 
     /// What the library answers to these frames after the first one.

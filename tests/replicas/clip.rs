@@ -70,11 +70,8 @@ impl Clip {
 }
 
 fn text(target: Rect) -> String {
-    let Rect {
-        x,
-        y,
-        width,
-        height,
-    } = target;
-    format!("{x},{y},{width},{height}")
+    format!(
+        "{},{},{},{}",
+        target.x, target.y, target.width, target.height
+    )
 }

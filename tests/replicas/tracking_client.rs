@@ -35,12 +35,7 @@ impl Track {
         let [x, y, width, height] = numbers[..] else {
             panic!("{} is no box", clip.first_box)
         };
-        let target = Rect {
-            x,
-            y,
-            width,
-            height,
-        };
+        let target = Rect::from([x, y, width, height]);
         let options = OpenOptions::new().seed(number as u64);
         let session = client.open(clip.frames[0].clone(), target, &options).await;
         let session = session.unwrap_or_else(|error| panic!("session {number}: {error}"));

@@ -30,12 +30,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
     if let Ok(key) = std::env::var("BAGTRACK_API_KEY") {
         client = client.api_key(&key);
     }
-    let target = Rect {
-        x,
-        y,
-        width,
-        height,
-    };
+    let target = Rect::from([x, y, width, height]);
     let options = OpenOptions::new().seed(1);
     let first = std::fs::read(first)?;
     let mut session = client.build()?.open(first, target, &options).await?;

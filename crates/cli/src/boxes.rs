@@ -38,12 +38,7 @@ pub fn parse_boxes(text: &str) -> Result<Vec<Option<Rect>>, String> {
                     let annotated = [x, y, width, height].iter().all(|n| n.is_finite())
                         && width > 0.0
                         && height > 0.0;
-                    Ok(annotated.then_some(Rect {
-                        x: x - 1.0,
-                        y: y - 1.0,
-                        width,
-                        height,
-                    }))
+                    Ok(annotated.then_some(Rect::new(x - 1.0, y - 1.0, width, height)))
                 }
                 _ => Err(format!(
                     "line {} is not x,y,width,height: {line:?}",
@@ -60,12 +55,7 @@ mod tests {
 
     #[test]
     fn boxes_may_be_separated_by_commas_tabs_or_spaces() {
-        let expected = Some(Rect {
-            x: 0.0,
-            y: 1.5,
-            width: 3.0,
-            height: 4.0,
-        });
+        let expected = Some(Rect::new(0.0, 1.5, 3.0, 4.0));
         for text in [
             "1,2.5,3,4",
             "1\t2.5\t3\t4",

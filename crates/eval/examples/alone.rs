@@ -76,15 +76,10 @@ fn follow(network: &NanoTrack, dir: &Path, full: bool) -> Result<[f64; 3], Box<d
         );
         let found = place.scaled(1.0 / horizontal, 1.0 / vertical);
         if std::env::var_os("BOXES").is_some() {
-            let Rect {
-                x,
-                y,
-                width,
-                height,
-            } = found;
+            let Rect { x, y, .. } = found;
             println!(
-                "{index} {x:.2} {y:.2} {width:.2} {height:.2} {:.3}",
-                sighting.score
+                "{index} {x:.2} {y:.2} {:.2} {:.2} {:.3}",
+                found.width, found.height, sighting.score
             );
         }
         if let Some(annotated) = annotated {

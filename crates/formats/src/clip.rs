@@ -26,12 +26,7 @@ impl Clip {
         let right = (area.x + area.width).min(f64::from(self.size.0));
         let bottom = (area.y + area.height).min(f64::from(self.size.1));
         let is_seen = row.estimate.status != Status::Lost && right > x && bottom > y;
-        is_seen.then_some(Rect {
-            x,
-            y,
-            width: right - x,
-            height: bottom - y,
-        })
+        is_seen.then_some(Rect::new(x, y, right - x, bottom - y))
     }
 
     /// The classes of the targets, in the order of the targets: those of one name are one.

@@ -231,12 +231,7 @@ mod tests {
     fn new_session(registry: &Registry) -> NewSession {
         let luma = (0..64 * 48).map(|i| (i * 7 % 251) as u8).collect();
         let frame = Frame::from_luma(64, 48, luma).unwrap();
-        let target = Rect {
-            x: 10.0,
-            y: 10.0,
-            width: 20.0,
-            height: 16.0,
-        };
+        let target = Rect::new(10.0, 10.0, 20.0, 16.0);
         let (print, params) = (Fingerprint::of(b"first"), Preset::Paper.params());
         let state = SessionState::start(
             &frame,

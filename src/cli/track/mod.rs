@@ -233,12 +233,7 @@ fn annotated(dir: &Path, index: u64) -> Result<Rect, String> {
 fn rect(text: &str) -> Result<Rect, String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
     match numbers.as_deref() {
-        Ok(&[x, y, width, height]) => Ok(Rect {
-            x,
-            y,
-            width,
-            height,
-        }),
+        Ok(&[x, y, width, height]) => Ok(Rect::new(x, y, width, height)),
         _ => Err("it must be four numbers: x,y,width,height".to_owned()),
     }
 }

@@ -62,15 +62,6 @@ enum Call {
     },
 }
 
-fn rect([x, y, width, height]: [f64; 4]) -> Rect {
-    Rect {
-        x,
-        y,
-        width,
-        height,
-    }
-}
-
 fn client(service: &ScriptedService, settings: &Settings) -> Client {
     let mut client = Client::builder(service.url());
     if let Some(frames) = settings.snapshot_every {
@@ -105,7 +96,7 @@ async fn make(
             correct,
             rect: right,
         } => {
-            let answer = opened.correct(correct.clone(), 0, rect(*right)).await;
+            let answer = opened.correct(correct.clone(), 0, Rect::from(*right)).await;
             answer.map(|answer| json!({"frame": answer.frame}))
         }
         Call::Snapshot { .. } => {
@@ -142,7 +133,7 @@ async fn replay(scenario: Scenario, target: Rect) {
 #[tokio::test]
 async fn exchanges() {
     let table: Table = serde_json::from_str(TABLE).unwrap();
-    let target = rect(table.rect);
+    let target = Rect::from(table.rect);
     let mut failed = Vec::new();
     for scenario in table.scenarios {
         let name = scenario.name.clone();

@@ -74,12 +74,8 @@ fn the_ground_truth_is_where_the_card_is_drawn() {
 }
 
 fn grown(card: Rect) -> Rect {
-    Rect {
-        x: card.x - 5.0,
-        y: card.y - 5.0,
-        width: card.width + 10.0,
-        height: card.height + 10.0,
-    }
+    let (width, height) = (card.width + 10.0, card.height + 10.0);
+    Rect::new(card.x - 5.0, card.y - 5.0, width, height)
 }
 
 #[test]

@@ -45,12 +45,8 @@ pub(super) fn board(course: &Course, index: u32) -> Option<Rect> {
     }
     let card = target(course, index);
     let y = card.y + card.height * (1.0 - covered);
-    Some(Rect {
-        x: card.x - 0.35 * card.width,
-        y,
-        width: 1.7 * card.width,
-        height: course.size().1 - y,
-    })
+    let (x, width) = (card.x - 0.35 * card.width, 1.7 * card.width);
+    Some(Rect::new(x, y, width, course.size().1 - y))
 }
 
 /// 1 inside the span and 0 outside it, with a smooth rise and fall of length `edge` inside its ends.
