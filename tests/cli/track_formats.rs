@@ -1,6 +1,8 @@
 //! How `bagtrack track` writes boxes: formats, several targets, files.
 
-use crate::command::{Row, boxes, fails, rows, sample_clip, succeeds, text, track};
+use crate::command::{
+    Row, bagtrack, boxes, clip, fails, folder, rows, sample_clip, succeeds, text, track,
+};
 use bagtrack_cli::parse_boxes;
 use serde_json::Value;
 use std::fs;
@@ -303,6 +305,20 @@ fn labels_of_yolo_go_to_a_new_folder() {
         line.contains("--name is given 2 times, for 1 box\n"),
         "{line}"
     );
+}
+
+/// No reader of XML took the file.
+#[test]
+fn what_xml_does_not_have_is_in_no_name() {
+    let parent = folder();
+    let dir = clip(parent.path(), "a\u{1}b", &["--frames", "3"]);
+    let cvat = succeeds(&["track", text(&dir), ONE, "--format", "cvat"]);
+    assert!(cvat.contains("a\u{fffd}b"), "{cvat}");
+    assert!(!cvat.contains('\u{1}'), "{cvat}");
+    let refused = bagtrack(&["track", text(&dir), ONE, "--name", "a\u{1}b"]);
+    let told = String::from_utf8(refused.stderr).expect("it is text");
+    assert!(told.contains("no control characters"), "{told}");
+    assert_eq!(refused.status.code(), Some(2));
 }
 
 #[test]

@@ -1,9 +1,12 @@
 //! `bagtrack track` on a video: where it starts, and when its frames are shown. Most need ffmpeg.
 
 use crate::command::{
-    about, bagtrack, boxes, clip, fails, folder, probe, rows, succeeds, text, video_of,
+    about, bagtrack, boxes, clip, fails, folder, probe, program, rows, succeeds, success, text,
+    video_of,
 };
+use std::ffi::OsStr;
 use std::fs;
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -411,6 +414,55 @@ pub fn shown_at(video: &Path) -> Vec<f64> {
     // Some frames have a line of their own for what stands beside them.
     let times = times.filter(|time| !time.is_empty());
     times.map(|time| time.parse().expect("a time")).collect()
+}
+
+/// The boxes of MP4 in these bytes, each with its head.
+fn mp4_boxes(mut bytes: &[u8]) -> Vec<&[u8]> {
+    let mut boxes = Vec::new();
+    while let Some(length) = bytes.first_chunk() {
+        let (first, rest) = bytes.split_at(u32::from_be_bytes(*length) as usize);
+        boxes.push(first);
+        bytes = rest;
+    }
+    boxes
+}
+
+/// The cover was taken for the video, which had one picture then; and the name was changed on its way to ffmpeg.
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_cover_before_the_tracks_is_no_track_and_a_name_may_be_no_text() {
+    let parent = folder();
+    let path = |name: &str| parent.path().join(name);
+    ffmpeg_in(
+        parent.path(),
+        &format!("{TEST_PICTURES} -frames:v 12 plain.mp4"),
+    );
+    ffmpeg_in(parent.path(), "-i plain.mp4 -frames:v 1 cover.jpg");
+    let with_cover =
+        "-i plain.mp4 -i cover.jpg -map 0 -map 1 -c copy -disposition:v:1 attached_pic";
+    ffmpeg_in(parent.path(), &format!("{with_cover} behind.mp4"));
+    let behind = fs::read(path("behind.mp4")).expect("it was written");
+    // The index is the last box. What it says of the whole file goes before its tracks.
+    let index = mp4_boxes(&behind).pop().expect("it has boxes");
+    let before = &behind[..behind.len() - index.len() + 8];
+    let inner = mp4_boxes(&index[8..]).into_iter();
+    let (mut about, tracks): (Vec<&[u8]>, Vec<_>) =
+        inner.partition(|inner| &inner[4..8] != b"trak");
+    about.extend(tracks);
+    let front = path("front.mp4");
+    fs::write(&front, [before, &about.concat()].concat()).expect("the folder is writable");
+    let first = probe(
+        &front,
+        "-select_streams v:0 -show_entries stream=codec_name",
+    );
+    assert_eq!(first.trim(), "mjpeg");
+    let no_text = parent.path().join(OsStr::from_bytes(b"front \xff.mp4"));
+    fs::rename(front, &no_text).expect("the folder is writable");
+    let mut command = Command::new(program("bagtrack"));
+    let command = command.arg("track").arg(no_text);
+    let command = command.args(["--box=10,20,30,40", "--format", "csv"]);
+    let printed = success(command.output().expect("it starts"));
+    assert_eq!(rows(&printed).len(), 12, "{printed}");
 }
 
 #[test]
