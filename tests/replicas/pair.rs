@@ -97,9 +97,9 @@ impl Pair {
     }
 
     /// A frame without a number.
-    pub async fn post_unnumbered(&self, replica: usize, file: usize) -> Response {
+    pub async fn post_unnumbered(&self, replica: usize) -> Response {
         let request = self.client.post(self.url(replica, "/frames"));
-        let request = request.body(self.clip.frames[file].clone());
+        let request = request.body(self.clip.frames[1].clone());
         request.send().await.unwrap()
     }
 

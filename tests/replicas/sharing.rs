@@ -13,10 +13,10 @@ use uuid::Uuid;
 async fn frames_without_numbers_are_taken_in_turns_but_not_at_once() {
     let pair = Pair::open(&[], 3).await;
     for number in 1..7 {
-        let answer = json(pair.post_unnumbered(number % 2, 1).await, StatusCode::OK);
+        let answer = json(pair.post_unnumbered(number % 2).await, StatusCode::OK);
         assert_eq!(answer.await["frame"], number);
     }
-    let posts = (0..6).map(|n| pair.post_unnumbered(n % 2, 1));
+    let posts = (0..6).map(|n| pair.post_unnumbered(n % 2));
     let mut numbers = Vec::new();
     for answer in futures_util::future::join_all(posts).await {
         match answer.status() {

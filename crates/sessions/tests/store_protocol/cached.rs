@@ -3,7 +3,6 @@
 use crate::common::{FLOW, assert_matches, place};
 use crate::formats::{open, post};
 use crate::hostile::HostileStore;
-use crate::memory::Records;
 use crate::pictures::{FRAMES, picture};
 use crate::world::{ID, LONG, parts, service, service_by, start};
 use bagtrack_sessions::{
@@ -15,7 +14,7 @@ use std::time::Duration;
 
 /// Two replicas, the first of which has opened a session.
 async fn two() -> [SessionService; 2] {
-    let store: Arc<dyn SessionStore> = Arc::new(HostileStore::at_once(Records::default()));
+    let store: Arc<dyn SessionStore> = Arc::new(HostileStore::at_once());
     let replicas = [0, 1].map(|_| service(Some(store.clone()), 1));
     open(&replicas[0], ID, start(1)).await;
     replicas
@@ -106,7 +105,7 @@ async fn frames_in_turns_at_two_replicas_have_the_answers_of_one() {
 
 #[tokio::test]
 async fn the_state_is_written_at_every_third_frame_and_at_each_before_the_end() {
-    let store: Arc<dyn SessionStore> = Arc::new(HostileStore::at_once(Records::default()));
+    let store: Arc<dyn SessionStore> = Arc::new(HostileStore::at_once());
     let replica = service(Some(store.clone()), 3);
     open(&replica, ID, start(1)).await;
     for (number, checkpoint) in [(1, 0), (2, 0), (3, 3), (4, 3)] {

@@ -1,5 +1,6 @@
 //! A store whose calls and replies are on their way for as long as a test wants. They can be lost or done twice.
 
+use crate::memory::Records;
 use crate::records::Backend;
 use bagtrack_sessions::{
     Commit, Outcome, Record, SessionName, SessionStore, StoreFuture, StoreUnavailable, Version,
@@ -65,9 +66,9 @@ impl HostileStore {
         Self::with(records, false)
     }
 
-    /// One that does all at once.
-    pub fn at_once(records: impl Backend + 'static) -> Self {
-        Self::with(records, true)
+    /// One in memory that does all at once.
+    pub fn at_once() -> Self {
+        Self::with(Records::default(), true)
     }
 
     fn with(records: impl Backend + 'static, is_quick: bool) -> Self {

@@ -2,7 +2,6 @@
 
 use crate::common::{FIRST, FLOW};
 use crate::hostile::HostileStore;
-use crate::memory::Records;
 use crate::pictures::{params, picture};
 use crate::redis::Redis;
 use crate::world::{LONG, request, service};
@@ -70,7 +69,7 @@ async fn keys_hold_for(store: Arc<dyn SessionStore>) {
 
 #[tokio::test]
 async fn with_a_store_in_memory_a_key_opens_one_session() {
-    keys_hold_for(Arc::new(HostileStore::at_once(Records::default()))).await;
+    keys_hold_for(Arc::new(HostileStore::at_once())).await;
 }
 
 #[tokio::test]

@@ -1,7 +1,6 @@
 //! What every store does, whatever keeps its records.
 
 use crate::hostile::HostileStore;
-use crate::memory::Records;
 use bagtrack_sessions::{
     Commit, Estimates, Opening, Outcome, Owner, Record, SessionName, SessionStore, Version,
 };
@@ -205,5 +204,5 @@ pub async fn holds_for(store: &dyn SessionStore) {
 
 #[tokio::test]
 async fn the_store_in_memory_keeps_to_the_rules() {
-    holds_for(&HostileStore::at_once(Records::default())).await;
+    holds_for(&HostileStore::at_once()).await;
 }
