@@ -5,10 +5,6 @@ import { rowOf, scaled } from "./boxes.js";
 import { close } from "./frames.js";
 
 /**
- * @typedef {import("./js/bagtrack.js").Box} Box
- * @typedef {import("./objects.js").FollowedObject} FollowedObject
- * @typedef {import("./run.js").Run} Run
- *
  * @typedef {object} Redoing
  * @property {(frame: number) => void} tell Is told of each frame.
  * @property {AbortSignal} signal Cancels it.
@@ -71,7 +67,7 @@ export async function trackBack(run, object, frame, { tell, signal }) {
   // An object's first box was drawn, too, and is kept.
   const until = Math.max(-1, ...drawn);
   const follower = run.follower();
-  /** @type {import("./objects.js").Row[]} */
+  /** @type {Row[]} */
   const rows = [];
   /** @type {number[]} */
   const added = [];
@@ -145,7 +141,7 @@ export async function catchUp(run, object, last = run.lastFrame) {
 /**
  * Goes on after the last frame, once what is under way is answered.
  * @param {Run} run
- * @param {import("./source.js").Source} source That of the run, or another one of the same frames.
+ * @param {Source} source That of the run, or another one of the same frames.
  */
 export async function goOn(run, source) {
   if (source !== run.source) {

@@ -3,7 +3,7 @@
 import { get, input } from "./dom.js";
 
 export class Beginning {
-  /** @param {import("./page.js").Page} page */
+  /** @param {Page} page */
   constructor(page) {
     this.page = page;
     /** @type {Promise<unknown>} The source is where it was sent before. */

@@ -1,7 +1,5 @@
 // Drawing a box: by mouse, pen or keyboard, and by a finger once drawing is on: without it a finger scrolls the page.
 
-/** @typedef {import("./js/bagtrack.js").Box} Box */
-
 /** Least side of a box in pixels of the frame. */
 const LEAST = 6;
 const STEP = 4;

@@ -1,11 +1,9 @@
 // Boxes in the pixels that they are meant in: the video's own, or those that are tracked and shown.
 
-/** @typedef {import("./js/bagtrack.js").Box} Box */
-
 /** A box in pixels of another size of the same picture.
  * @param {Box} box
- * @param {{width: number, height: number}} to
- * @param {{width: number, height: number}} from */
+ * @param {Size} to
+ * @param {Size} from */
 export function scaled(box, to, from) {
   if (to.width === from.width && to.height === from.height) return box;
   const [across, down] = [to.width / from.width, to.height / from.height];
@@ -15,19 +13,19 @@ export function scaled(box, to, from) {
 }
 
 /** What an answer tells of a frame, in the video's own pixels.
- * @param {import("./js/bagtrack.js").StreamAnswer} answer
- * @param {import("./source.js").Picture} picture
- * @param {{width: number, height: number}} size Of the video.
+ * @param {Answer} answer
+ * @param {Picture} picture
+ * @param {Size} size Of the video.
  * @param {boolean} corrected */
 export function rowOf({ box, score, status }, { frame, time, image }, size, corrected) {
   return { frame, time: Number(time.toFixed(3)), box: scaled(box, size, image), score, status, corrected };
 }
 
 /** What is shown of the objects in a frame.
- * @param {import("./run.js").Run} run
+ * @param {Run} run
  * @param {number} frame
- * @param {{width: number, height: number}} image
- * @param {import("./objects.js").FollowedObject} [chosen] The one that stands out; all of them where there is none. */
+ * @param {Size} image
+ * @param {FollowedObject} [chosen] The one that stands out; all of them where there is none. */
 export function shownIn({ objects, source }, frame, image, chosen) {
   const isNamed = objects.length > 1;
   return objects.flatMap((object) => {

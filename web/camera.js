@@ -2,11 +2,6 @@
 
 import { addVideo, drawFrame, encoded, loaded } from "./source.js";
 
-/**
- * @typedef {import("./source.js").Picture} Picture
- * @typedef {import("./source.js").Source} Source
- */
-
 /** @implements {Source} */
 export class Camera {
   /**

@@ -1,8 +1,6 @@
 // The frames of a file, decoded one after the other. Each is asked for by its number, in the order in which they are
 // shown.
 
-/** @typedef {import("./indexer.js").Index} Index */
-
 /** Samples that wait for the decoder at a time. */
 const MOST_QUEUED = 4;
 /** Bytes of the file that are read at a time. */

@@ -4,7 +4,6 @@ import { areEqual } from "./playback.js";
 import { encoded } from "./source.js";
 
 /**
- * @typedef {import("./source.js").Picture} Picture
  * @typedef {{image: HTMLCanvasElement, time: number, frame: number}} Taken
  */
 

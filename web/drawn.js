@@ -4,13 +4,13 @@ import { Problem } from "./js/problem.js";
 
 /**
  * @typedef {object} Drawn A box until it is answered.
- * @property {import("./js/bagtrack.js").Box} box
- * @property {import("./objects.js").FollowedObject | undefined} object Nothing for a new one.
+ * @property {Box} box
+ * @property {FollowedObject | undefined} object Nothing for a new one.
  * @property {boolean} [isSent]
  */
 
 /** Tracks the box that was drawn, if there is one and no frame is on its way.
- * @param {import("./run.js").Run} run */
+ * @param {Run} run */
 export async function sendDrawn(run) {
   const { drawn, picture } = run;
   if (!drawn || run.underWay.length > 0) return run.throttle();

@@ -11,19 +11,13 @@ import { Undoing } from "./undo.js";
 /** Loaded when a source is open. */
 export const again = () => import("./again.js");
 
-/**
- * @typedef {import("./js/bagtrack.js").Box} Box
- * @typedef {import("./objects.js").FollowedObject} FollowedObject
- * @typedef {import("./run.js").Run} Run
- */
-
 export const DRAW = "Draw a box around what to follow.";
 export const TAP = matchMedia("(pointer: coarse)").matches ? "Tap Draw. " : "";
 const ABSENT = "Nothing can be tracked without the video.";
 const ADD = "Draw a box around the object to add.";
 
 export class Editing {
-  /** @param {import("./page.js").Page} page */
+  /** @param {Page} page */
   constructor(page) {
     this.page = page;
     /** Whether the next box is that of a new object. */

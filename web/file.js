@@ -10,11 +10,6 @@ import { Playback, SAME, areEqual, isEmpty, learnRate } from "./playback.js";
 import { GONE, isReadable } from "./problems.js";
 import { addVideo, drawFrame, encoded, loaded } from "./source.js";
 
-/**
- * @typedef {import("./source.js").Picture} Picture
- * @typedef {import("./source.js").Source} Source
- */
-
 /** The rate that a file begins with, until the interval between its frames is known. */
 const CAUTIOUS = 0.5;
 const LEARNED_AFTER = 6;

@@ -4,25 +4,10 @@ import { LocalClient } from "./js/local.js";
 import { Problem } from "./js/problem.js";
 
 /**
- * @typedef {import("./js/bagtrack.js").Box} Box
- * @typedef {import("./js/bagtrack.js").StreamAnswer} Answer
- * @typedef {import("./source.js").Picture} Picture
- *
- * @typedef {{box?: Box, see?: boolean}} Header The right box, where the user drew it; whether the answer tells what was
- *   seen.
- *
  * @typedef {object} Told
  * @property {(isUp: boolean) => void} line
  * @property {() => void} anew The service had lost the session: another one goes on from the last box.
  * @property {(error: unknown) => void} fail
- *
- * @typedef {object} Follower
- * @property {(picture: Picture, box: Box) => Promise<Answer>} open
- * @property {(saved: Uint8Array<ArrayBuffer>) => Promise<number>} restore Goes on from there; the number of its frame.
- * @property {(picture: Picture, header: Header) => Promise<Answer | undefined>} track Nothing for a frame that was skipped.
- * @property {() => Promise<Uint8Array<ArrayBuffer>>} save
- * @property {() => Promise<Blob>} bag A picture of what is kept of the object.
- * @property {() => void} end
  */
 
 /** Frames on their way at a time. */
@@ -30,7 +15,7 @@ export const WINDOW = 8;
 
 /** Tracks a frame for all objects at once: it is decoded once. */
 class Batch {
-  /** @param {import("./js/bagtrack.js").LocalClient} client */
+  /** @param {LocalClient} client */
   constructor(client) {
     this.client = client;
     /** @type {{picture: Picture, see: boolean, sessions: any[], told: ((answers: Promise<Answer[]>) => void)[]} | undefined} */
@@ -38,7 +23,7 @@ class Batch {
   }
 
   /**
-   * @param {import("./js/bagtrack.js").LocalSession} session
+   * @param {LocalSession} session
    * @param {Picture} picture
    * @param {boolean} see
    * @returns {Promise<Answer>}
@@ -67,17 +52,17 @@ class Batch {
   }
 }
 
-/** @type {WeakMap<import("./js/bagtrack.js").LocalClient, Batch>} */
+/** @type {WeakMap<LocalClient, Batch>} */
 const batches = new WeakMap();
 
 /** @implements {Follower} */
 export class LocalFollower {
-  /** @param {import("./js/bagtrack.js").LocalClient} client */
+  /** @param {LocalClient} client */
   constructor(client) {
     this.client = client;
     this.batch = batches.get(client) ?? new Batch(client);
     batches.set(client, this.batch);
-    /** @type {import("./js/bagtrack.js").LocalSession | undefined} */
+    /** @type {LocalSession | undefined} */
     this.session = undefined;
   }
 
@@ -124,7 +109,7 @@ export class LocalFollower {
 /** @implements {Follower} */
 export class ServiceFollower {
   /**
-   * @param {import("./js/bagtrack.js").Client} client
+   * @param {Client} client
    * @param {boolean} isLive
    * @param {Told} told
    */
@@ -132,9 +117,9 @@ export class ServiceFollower {
     this.client = client;
     this.isLive = isLive;
     this.told = told;
-    /** @type {import("./js/bagtrack.js").Session | undefined} */
+    /** @type {Session | undefined} */
     this.session = undefined;
-    /** @type {import("./js/bagtrack.js").FrameStream | undefined} */
+    /** @type {FrameStream | undefined} */
     this.stream = undefined;
     /** Whether the session has answered. */
     this.hasAnswered = false;
@@ -169,7 +154,7 @@ export class ServiceFollower {
     return session.frame;
   }
 
-  /** @param {import("./js/bagtrack.js").Session} session */
+  /** @param {Session} session */
   connect(session) {
     this.session = session;
     this.hasAnswered = false;
@@ -272,7 +257,7 @@ export class ServiceFollower {
 }
 
 /** Where the frames of a run are tracked, for one object.
- * @param {import("./run.js").Run} run
+ * @param {Run} run
  * @returns {Follower} */
 export function followerOf(run) {
   const { client, source, told } = run;

@@ -1,7 +1,5 @@
 // The frames that were tracked: their times, and the pictures of as many as memory allows.
 
-/** @typedef {import("./source.js").Picture} Picture */
-
 /** Most bytes of pictures. */
 const MOST_BYTES = 512 << 20;
 
@@ -9,7 +7,7 @@ const MOST_BYTES = 512 << 20;
 const RATE_OVER = 30;
 
 export class Frames {
-  /** @param {import("./source.js").Source} source */
+  /** @param {Source} source */
   constructor(source) {
     this.source = source;
     /** @type {Map<number, number>} Seconds from the beginning of the video, by numbers in the video. */

@@ -5,8 +5,6 @@ import { scaled } from "./boxes.js";
 import { refusedState } from "./objects.js";
 
 /**
- * @typedef {import("./run.js").Run} Run
- *
  * @typedef {object} Handed
  * @property {string} name Of the object.
  * @property {string} id Of its session.
@@ -15,7 +13,7 @@ import { refusedState } from "./objects.js";
 
 /**
  * @param {Run} run
- * @param {import("./js/bagtrack.js").Client} client
+ * @param {Client} client
  * @returns {Promise<Handed[]>}
  */
 export async function handOver(run, client) {
@@ -30,8 +28,8 @@ export async function handOver(run, client) {
 
 /** A session with the tracker's state; nothing where the service does not take it, or where there is none.
  * @param {Run} run
- * @param {import("./objects.js").FollowedObject} object
- * @param {import("./js/bagtrack.js").Client} client */
+ * @param {FollowedObject} object
+ * @param {Client} client */
 async function restored(run, object, client) {
   const save = async () => object.follower.save();
   // Loaded anew, the page has no session yet, but its state of some frames before.
@@ -44,8 +42,8 @@ async function restored(run, object, client) {
 
 /**
  * @param {Run} run
- * @param {import("./objects.js").FollowedObject} object
- * @param {import("./js/bagtrack.js").Client} client */
+ * @param {FollowedObject} object
+ * @param {Client} client */
 async function openedAnew(run, object, client) {
   const row = [...object.rows.values()].pop();
   const picture = row && (await run.frames.at(row.frame));

@@ -44,7 +44,7 @@ const shownFor = (frame) => (Number(frame?.duration) > 1e4 ? Number(frame?.durat
 
 /** An animation, whose frames have times of their own; nothing where a file is a still image.
  * @param {File} file
- * @returns {Promise<import("./source.js").Source | undefined>} */
+ * @returns {Promise<Source | undefined>} */
 export async function openAnimated(file) {
   const format = ANIMATED.exec(file.type || file.name)?.[0].toLowerCase();
   if (!format) return undefined;

@@ -8,13 +8,6 @@ import { keepWork, keptFiles, keptWork, ownWork, setOwnWork } from "./kept.js";
 import { isReadable } from "./problems.js";
 import { openFiles } from "./sources.js";
 
-/**
- * @typedef {import("./kept.js").Kept} Kept
- * @typedef {import("./project.js").Project} Project
- * @typedef {import("./run.js").Run} Run
- * @typedef {import("./source.js").Source} Source
- */
-
 /** Milliseconds after a change until it is kept, and one more for so many rows: all of them are written each time. */
 const AFTER = 1000;
 const ROWS = 10;
@@ -30,7 +23,7 @@ const projects = () =>
 const openClip = async (/** @type {string} */ name) => (await import("./clip.js")).openClip(name);
 
 export class Keeping {
-  /** @param {import("./page.js").Page} page */
+  /** @param {Page} page */
   constructor(page) {
     this.page = page;
     /** The entry of what is here. */

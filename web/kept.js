@@ -1,24 +1,6 @@
 // What the browser keeps of the page, so that nothing is lost: of each run the project, the states of the trackers, and
 // the files where they are small. A run has an entry of its own, which one tab at a time has open.
 
-/**
- * @typedef {import("./project.js").Project} Project
- *
- * @typedef {object} State Of a tracker.
- * @property {Uint8Array<ArrayBuffer>} bytes
- * @property {number[]} frames The frame of the video that each frame of the session was.
- * @property {number} [after] A frame of the video that it has seen: there may be later ones.
- *
- * @typedef {object} Kept
- * @property {string} id
- * @property {number} at When it was kept, in milliseconds.
- * @property {boolean} isLocal Whether it was tracked in the page.
- * @property {Project} project
- * @property {Record<number, State>} states The last one of each object.
- * @property {string} [clip] The sample clip.
- * @property {string[]} [imageNames] Of images.
- */
-
 const NAME = "bagtrack";
 /** What the tab has open, also after it was loaded anew. */
 const OWN = "work";

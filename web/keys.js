@@ -2,8 +2,6 @@
 
 import { button } from "./dom.js";
 
-/** @typedef {import("./page.js").Page} Page */
-
 /** What takes keys of its own. */
 const TEXT = "input:not([type=radio], [type=checkbox], [type=range])";
 const ARROWS = "input, pre";

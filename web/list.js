@@ -1,8 +1,6 @@
 // The list of objects.
 
 /**
- * @typedef {import("./objects.js").FollowedObject} FollowedObject
- *
  * @typedef {object} Told
  * @property {(object: FollowedObject) => void} choose
  * @property {(object: FollowedObject) => void} remove

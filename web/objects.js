@@ -2,19 +2,6 @@
 
 import { Problem } from "./js/problem.js";
 
-/**
- * @typedef {import("./follower.js").Follower} Follower
- * @typedef {import("./js/bagtrack.js").Box} Box
- *
- * @typedef {object} Row What is known of an object in a frame.
- * @property {number} frame Its number in the video.
- * @property {number} time Seconds from the beginning of the video.
- * @property {Box} box In the video's own pixels.
- * @property {number} score
- * @property {"tracking" | "uncertain" | "lost"} status
- * @property {boolean} corrected Whether the box was drawn.
- */
-
 export const MOST_OBJECTS = 16;
 /** Frames after which the state is saved, so that one can go on from there. */
 export const SAVE_EVERY = 30;
@@ -35,7 +22,7 @@ export function refusedState(error) {
 
 /** Gives up states where there are too many. What is left lies closer the nearer the last frame is: the frames after a
  * correction are tracked again, and those from a state to it come on top.
- * @param {import("./kept.js").State[]} saves */
+ * @param {TrackerState[]} saves */
 function thin(saves) {
   const at = (/** @type {number} */ index) => saves[index].after ?? 0;
   while (saves.length > MOST_SAVES) {
@@ -61,7 +48,7 @@ export class FollowedObject {
     this.rows = new Map();
     /** @type {number[]} The frame of the video that each frame of the session was. */
     this.frames = [];
-    /** @type {import("./kept.js").State[]} Oldest first. */
+    /** @type {TrackerState[]} Oldest first. */
     this.saves = [];
     /** Whether the service has not taken a state. */
     this.isForgotten = false;

@@ -7,14 +7,11 @@ import { prepareSaving } from "./saving.js";
 import { offerDecoding } from "./sources.js";
 
 /**
- * @typedef {import("./run.js").Run} Run
- * @typedef {import("./source.js").Source} Source
- *
  * @typedef {(run: Run) => Promise<boolean>} Resume Brings back what was tracked in a source, and says whether it did.
  */
 
 export class Opening {
-  /** @param {import("./page.js").Page} page */
+  /** @param {Page} page */
   constructor(page) {
     this.page = page;
     /** Counts the choices: one that is overtaken by another is dropped. */

@@ -15,10 +15,6 @@ import { Stage } from "./stage.js";
 import { Timeline } from "./timeline.js";
 
 /**
- * @typedef {import("./js/bagtrack.js").Box} Box
- * @typedef {import("./run.js").Run} Run
- * @typedef {import("./source.js").Picture} Picture
- *
  * @typedef {"start" | "opening" | "first" | "following" | "paused" | "ended"} State `first` waits for the first box;
  *   from `following` on there are rows. What is shown in which state stands in the page, in `data-in` and `data-on`.
  */
@@ -26,7 +22,7 @@ import { Timeline } from "./timeline.js";
 export class Page {
   constructor() {
     this.local = new LocalClient();
-    /** @type {Promise<import("./js/bagtrack.js").Client> | undefined} */
+    /** @type {Promise<Client> | undefined} */
     this.client = undefined;
     this.message = new Message(get("message"));
     this.stage = new Stage(canvas("picture"), canvas("overlay"));
@@ -151,7 +147,7 @@ export class Page {
     this.leave();
   }
 
-  /** @returns {import("./run.js").Told} */
+  /** @returns {RunTold} */
   told() {
     return {
       answer: (picture, answer) => this.answered(picture, answer),
@@ -220,7 +216,7 @@ export class Page {
     if (this.hasRows && this.shown) this.show(this.shown, isLast ? this.particles : undefined);
   }
 
-  /** @type {import("./run.js").Told["answer"]} */
+  /** @type {RunTold["answer"]} */
   answered(shown, answer) {
     const { run } = this;
     if (!run) return;

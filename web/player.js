@@ -6,7 +6,7 @@ import { close } from "./frames.js";
 import { BEGINNING, FOLLOWING } from "./message.js";
 
 export class Player {
-  /** @param {import("./page.js").Page} page */
+  /** @param {Page} page */
   constructor(page) {
     this.page = page;
     /** The frame that it shows now is this view of the page: any other one ends it. */

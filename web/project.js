@@ -4,22 +4,6 @@
 import { FollowedObject } from "./objects.js";
 import { openFiles } from "./sources.js";
 
-/**
- * @typedef {import("./keeping.js").Keeping} Keeping
- * @typedef {import("./run.js").Run} Run
- * @typedef {import("./objects.js").Row} Row
- *
- * @typedef {[frame: number, time: number, x: number, y: number, width: number, height: number, score: number,
- *   status: Row["status"], isKey: 0 | 1]} StoredRow `isKey`: the box was drawn.
- *
- * @typedef {object} Project
- * @property {1} bagtrack_project The version.
- * @property {{name: string, width: number, height: number, rate?: number, live?: boolean}} video `live`: of a camera.
- * @property {boolean} ended Whether the whole video was tracked.
- * @property {number} skipped Frames that were not tracked.
- * @property {{number: number, name: string, color: string, shown: boolean, rows: StoredRow[]}[]} objects
- */
-
 const STATUSES = ["tracking", "uncertain", "lost"];
 /** Bytes of a project file that tell that it is one. */
 const HEAD = 100;
@@ -98,7 +82,7 @@ export function adopt(run, project) {
 
 /** A source for rows whose video is not at hand: its pictures are empty.
  * @param {Project} project
- * @returns {import("./source.js").Source} */
+ * @returns {Source} */
 export function withoutVideo({ video, objects }) {
   const image = document.createElement("canvas");
   [image.width, image.height] = [video.width, video.height];
@@ -129,7 +113,7 @@ async function projectIn(files) {
 }
 
 /** In what a source differs from the video of a project; nothing where it may be that.
- * @param {import("./source.js").Source} source
+ * @param {Source} source
  * @param {Project} project */
 function unlike({ name, size, count = Infinity }, { video, objects }) {
   // More rows than a call takes arguments.
@@ -142,7 +126,7 @@ function unlike({ name, size, count = Infinity }, { video, objects }) {
   return `${name} has ${count} frames, and this project (${video.name}) a box in frame ${last}: it is another video.`;
 }
 
-/** @param {import("./source.js").Source} source
+/** @param {Source} source
  * @param {Project} project */
 function fitting(source, project) {
   const fault = unlike(source, project);

@@ -8,29 +8,12 @@ import { LocalClient } from "./js/local.js";
 import { FollowedObject } from "./objects.js";
 import { isUnreadable } from "./problems.js";
 
-/**
- * @typedef {import("./js/bagtrack.js").Box} Box
- * @typedef {import("./source.js").Picture} Picture
- * @typedef {import("./js/bagtrack.js").StreamAnswer} Answer
- * @typedef {import("./objects.js").Row} Row
- *
- * @typedef {object} Told
- * @property {(picture: Picture, answer: Answer | undefined) => void} answer A frame is answered: what was answered for the
- *   chosen object.
- * @property {(error: unknown) => void} fail The source fails: it has no more frames that can be had.
- * @property {(error: unknown) => void} rest What tracks fails, or the line to the source. One can go on from there.
- * @property {(error: unknown) => void} refuse A box that was drawn cannot be followed. Nothing has changed.
- * @property {(isUp: boolean) => void} line
- * @property {() => void} anew The service had lost a session: another one goes on from the last box.
- * @property {() => void} end The source has no more frames, and all are answered.
- */
-
 export class Run {
   /**
-   * @param {import("./js/bagtrack.js").Client | LocalClient} client Where it is tracked.
-   * @param {import("./source.js").Source} source
+   * @param {Client | LocalClient} client Where it is tracked.
+   * @param {Source} source
    * @param {Picture} picture The first one.
-   * @param {Told} told
+   * @param {RunTold} told
    */
   constructor(client, source, picture, told) {
     this.client = client;

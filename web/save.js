@@ -3,9 +3,6 @@
 import { projectOf } from "./project.js";
 import { zip } from "./zip.js";
 
-/** @typedef {import("./run.js").Run} Run */
-/** @typedef {import("./objects.js").Row} Row */
-
 /** What is said of a video. In a CSV it stands in every row, so that spreadsheets and programs read the table as it is.
  * @param {Run} run */
 function about({ source }) {
@@ -14,7 +11,7 @@ function about({ source }) {
 }
 
 /** What an object is called, also where its name was deleted.
- * @param {import("./objects.js").FollowedObject} object */
+ * @param {FollowedObject} object */
 const nameOf = ({ name, number }) => name.trim() || `Object ${number + 1}`;
 
 /** The classes of objects: those of one name are one.

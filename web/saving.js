@@ -3,9 +3,6 @@
 import { button, get } from "./dom.js";
 import { words } from "./problems.js";
 
-/** @typedef {import("./run.js").Run} Run */
-/** @typedef {import("./page.js").Page} Page */
-
 const modules = () => Promise.all([import("./save.js"), import("./recording.js"), import("./handover.js")]);
 
 /** @param {Page} page */

@@ -2,8 +2,6 @@
 
 import { colorOf, paintParticles, shareOf } from "./particles.js";
 
-/** @typedef {import("./js/bagtrack.js").Box} Box */
-
 /** So many of the likeliest ones are shown as boxes. */
 const BOXES = 24;
 /** The closer look is so many times as wide as the box, at least and at most. */

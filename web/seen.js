@@ -6,13 +6,6 @@ import { canvas, get, input } from "./dom.js";
 import { close } from "./frames.js";
 import { copyPatch } from "./stage.js";
 
-/**
- * @typedef {import("./js/bagtrack.js").StreamAnswer} Answer
- * @typedef {import("./objects.js").FollowedObject} FollowedObject
- * @typedef {import("./run.js").Run} Run
- * @typedef {import("./source.js").Picture} Picture
- */
-
 /** From this width of the window on there is room beside the picture. */
 const ROOM = matchMedia("(min-width: 64rem)");
 /** Milliseconds after which the bag is shown again. */
@@ -62,7 +55,7 @@ export class Seen {
     set("skipped", String(run.skipped));
   }
 
-  /** @param {import("./objects.js").Row | undefined} row Of the chosen object in the frame that is shown. */
+  /** @param {Row | undefined} row Of the chosen object in the frame that is shown. */
   score(row) {
     get("status").textContent = row?.status ?? "–";
     get("score").textContent = row?.score.toFixed(2) ?? "–";

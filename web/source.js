@@ -1,36 +1,4 @@
-// What frames come from, and how a frame of a video element becomes a picture.
-
-/**
- * @typedef {object} Picture A frame as it is uploaded and as it is shown, in the same pixels.
- * @property {Blob} blob
- * @property {HTMLCanvasElement | ImageBitmap} image
- * @property {number} time Seconds from the beginning of the video.
- * @property {number} frame Its number in the video; that of the first is 0.
- *
- * @typedef {object} Source Where frames come from.
- * @property {string} name What results are named after.
- * @property {boolean} isLive Whether it goes on by itself, so that late frames are skipped.
- * @property {{width: number, height: number}} size In the video's own pixels.
- * @property {number | undefined} rate Frames a second, as far as is known.
- * @property {number} skipped Frames that were not delivered.
- * @property {() => Promise<Picture>} first The first frame.
- * @property {(deliver: (picture: Picture) => void, end: () => void) => Promise<void>} start Delivers the frames after
- *   it. Fails where they cannot be had.
- * @property {(isHeld: boolean) => void} hold Stops delivering for a while.
- * @property {() => void} stop Takes no more frames.
- * @property {number} [duration] Seconds, where one may begin anywhere.
- * @property {number} [count] How many frames there are, where that is known.
- * @property {(frame: number) => number} [timeOf] Of any frame, where the times are known.
- * @property {string[]} [imageNames] The files of the frames, where each is one.
- * @property {(time: number, frame?: number) => Promise<Picture>} [goTo] Begins at a time, and gives its frame.
- * @property {(frame: number, time: number) => Promise<Picture>} [at] Any frame again. It works after `stop`, too.
- * @property {() => void} [close] Gives up what `at` needs.
- * @property {(show: (image: HTMLCanvasElement) => void) => void} [preview] Shows what is seen, until `first` is called.
- * @property {string} [note] What is to be said once it is open.
- * @property {boolean} [isFetched] Whether its frames come over a line: one that fails may come later.
- * @property {boolean} [isAbsent] Whether its pictures are empty: the video of a project is not at hand.
- * @property {File[]} [files] What can be kept of it, so that it can be opened again.
- */
+// How a frame of a video element becomes a picture.
 
 const QUALITY = 0.85;
 /** Longest side of an uploaded frame in pixels: the tracker needs no more. */
@@ -67,7 +35,7 @@ export function drawFrame(video, canvas = document.createElement("canvas")) {
 
 /** Draws an image as large as it is uploaded.
  * @param {CanvasImageSource} image
- * @param {{width: number, height: number}} size As it is shown.
+ * @param {Size} size As it is shown.
  * @param {HTMLCanvasElement} [canvas]
  * @param {number} [rotation] How far it is to be turned clockwise, in degrees: quarters of a turn. */
 export function drawScaled(image, size, canvas = document.createElement("canvas"), rotation = 0) {

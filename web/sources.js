@@ -7,8 +7,6 @@ import { GONE, UnplayableError, isReadable } from "./problems.js";
 const modules = () =>
   Promise.all([import("./video.js"), import("./images.js"), import("./camera.js"), import("./clip.js")]);
 
-/** @typedef {import("./source.js").Source} Source */
-
 /** Opens what files are: one video, or images. Of several videos the first.
  * @param {File[]} files
  * @param {string[]} [names] Of images that have been opened before.
@@ -64,7 +62,7 @@ async function filesIn(entry) {
 }
 
 /** Offers to have a file decoded by the service: it is uploaded for that.
- * @param {import("./page.js").Page} page
+ * @param {Page} page
  * @param {File} file
  * @param {import("./opening.js").Resume} [resume] */
 export function offerDecoding(page, file, resume) {

@@ -2,8 +2,6 @@
 
 import { paintParticles } from "./particles.js";
 
-/** @typedef {import("./js/bagtrack.js").Box} Box */
-
 /**
  * @typedef {object} Shown An object in the picture.
  * @property {Box} box In pixels of the picture.

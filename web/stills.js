@@ -1,10 +1,5 @@
 // Frames of which any can be had at any time: those of a sample clip, a folder of images, a decoded file.
 
-/**
- * @typedef {import("./source.js").Picture} Picture
- * @typedef {import("./source.js").Source} Source
- */
-
 /** Frames that are loaded ahead. */
 const AHEAD = 12;
 

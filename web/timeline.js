@@ -1,7 +1,5 @@
 // The timeline: all frames, the score of the chosen object as a curve, and the frame that is shown.
 
-/** @typedef {import("./objects.js").Row} Row */
-
 const STATUSES = /** @type {const} */ (["tracking", "uncertain", "lost"]);
 /** @type {Record<string, number>} */
 const STEPS = { ArrowLeft: -1, ArrowRight: 1, PageUp: -10, PageDown: 10, Home: -Infinity, End: Infinity };

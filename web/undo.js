@@ -1,15 +1,12 @@
 // Undoing corrections and deletions: each brings back the rows and states of one object as they were before it.
 
 /**
- * @typedef {import("./objects.js").FollowedObject} FollowedObject
- * @typedef {import("./run.js").Run} Run
- *
  * @typedef {object} Step An object before it is changed.
  * @property {number} number Of the object.
- * @property {Map<number, import("./objects.js").Row>} [rows] Nothing for an object that is added.
- * @property {import("./kept.js").State[]} saves
+ * @property {Map<number, Row>} [rows] Nothing for an object that is added.
+ * @property {TrackerState[]} saves
  * @property {number} last The last frame.
- * @property {import("./follower.js").Follower} [follower] The session, where it learns nothing of the correction.
+ * @property {Follower} [follower] The session, where it learns nothing of the correction.
  * @property {FollowedObject} [deleted]
  */
 

@@ -5,13 +5,6 @@ import { openPlayed } from "./file.js";
 import { drawScaled, encoded } from "./source.js";
 import { Stills, undamaged } from "./stills.js";
 
-/**
- * @typedef {import("./indexer.js").Index} Index
- * @typedef {import("./source.js").Picture} Picture
- * @typedef {import("./source.js").Source} Source
- * @typedef {{width: number, height: number}} Size
- */
-
 /** Where the frames of a file are; nothing where that cannot be told, or the browser does not decode them for a page.
  * @param {File} file */
 async function indexOf(file) {
