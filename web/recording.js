@@ -6,8 +6,6 @@ import { matroska } from "./matroska.js";
 import { encoded } from "./source.js";
 import { paintBox } from "./stage.js";
 
-/** @typedef {import("./matroska.js").Chunk} Chunk */
-
 /** Of these the one that the browser encodes faster: they differ by ten times, here one way and there the other. */
 const CODECS = /** @type {const} */ ([
   ["vp8", "V_VP8"],
@@ -27,17 +25,16 @@ export const encodes = typeof VideoEncoder !== "undefined";
 export const extension = encodes ? "webm" : "mkv";
 
 /**
- * Draws the objects' boxes into their frames.
- * @param {import("./run.js").Run} run
- * @param {(canvas: HTMLCanvasElement, time: number, index: number) => Promise<void>} write
+ * Draws the frames with the objects' boxes, one after the other.
+ * @param {Run} run
+ * @param {HTMLCanvasElement} canvas
  * @param {(done: number, of: number) => void} tell
  */
-async function draw(run, write, tell) {
-  const canvas = document.createElement("canvas");
+async function* drawn(run, canvas, tell) {
   const context = canvas.getContext("2d");
-  const drawn = run.frames.shown;
+  const frames = run.frames.shown;
   let begun = 0;
-  for (const [index, frame] of drawn.entries()) {
+  for (const [index, frame] of frames.entries()) {
     const picture = await run.frames.at(frame);
     if (!picture) continue;
     const { image, time } = picture;
@@ -46,29 +43,20 @@ async function draw(run, write, tell) {
     context?.drawImage(image, 0, 0);
     for (const object of shownIn(run, frame, image)) if (context) paintBox(context, object);
     close(picture);
-    await write(canvas, Math.round((time - begun) * 1000), index);
-    tell(index + 1, drawn.length);
+    yield { time: Math.round((time - begun) * 1000), index };
+    tell(index + 1, frames.length);
   }
-  return canvas;
 }
 
-/** How long the last frame is shown, in milliseconds.
- * @param {import("./run.js").Run} run */
-const lastFrame = ({ source }) => 1000 / (source.rate ?? 25);
-
-/** @type {typeof makeVideo} */
-async function makeJpegs(run, tell) {
+/** @type {typeof encodeVideo} */
+async function makeJpegs(run, canvas, tell) {
   /** @type {Chunk[]} */
   const chunks = [];
-  const { width, height } = await draw(
-    run,
-    async (canvas, time) => {
-      const blob = await encoded(canvas, QUALITY);
-      chunks.push({ time, isKey: true, bytes: new Uint8Array(await blob.arrayBuffer()) });
-    },
-    tell,
-  );
-  return matroska({ codec: "V_MJPEG", width, height }, chunks, chunks[chunks.length - 1].time + lastFrame(run));
+  for await (const { time } of drawn(run, canvas, tell)) {
+    const blob = await encoded(canvas, QUALITY);
+    chunks.push({ time, isKey: true, bytes: new Uint8Array(await blob.arrayBuffer()) });
+  }
+  return { codec: "V_MJPEG", chunks };
 }
 
 /** An encoder, and what it has encoded. */
@@ -132,37 +120,41 @@ async function quickest(canvas, config) {
   return first;
 }
 
-/** @type {typeof makeVideo} */
-async function encodeVideo(run, tell) {
+/**
+ * @param {Run} run
+ * @param {HTMLCanvasElement} canvas
+ * @param {(done: number, of: number) => void} tell
+ * @returns {Promise<{codec: import("./matroska.js").Track["codec"], chunks: Chunk[]}>}
+ */
+async function encodeVideo(run, canvas, tell) {
   /** @type {Encoder | undefined} */
   let encoder;
   /** @type {"V_VP8" | "V_VP9"} */
   let codec = "V_VP8";
-  const { width, height } = await draw(
-    run,
-    async (canvas, time, index) => {
-      if (!encoder) {
-        const { width, height } = canvas;
-        const framerate = run.source.rate ?? 25;
-        const bitrate = Math.round(width * height * framerate * BITS_A_PIXEL);
-        const config = { codec: CODECS[0][0], width, height, bitrate, framerate };
-        const chosen = await quickest(canvas, config);
-        codec = chosen.name;
-        encoder = new Encoder({ ...config, codec: chosen.codec });
-      }
-      await encoder.write(canvas, time, index);
-    },
-    tell,
-  );
-  const chunks = (await encoder?.finish()) ?? [];
-  return matroska({ codec, width, height }, chunks, chunks[chunks.length - 1].time + lastFrame(run));
+  for await (const { time, index } of drawn(run, canvas, tell)) {
+    if (!encoder) {
+      const { width, height } = canvas;
+      const framerate = run.source.rate ?? 25;
+      const bitrate = Math.round(width * height * framerate * BITS_A_PIXEL);
+      const config = { codec: CODECS[0][0], width, height, bitrate, framerate };
+      const chosen = await quickest(canvas, config);
+      codec = chosen.name;
+      encoder = new Encoder({ ...config, codec: chosen.codec });
+    }
+    await encoder.write(canvas, time, index);
+  }
+  return { codec, chunks: (await encoder?.finish()) ?? [] };
 }
 
 /**
- * @param {import("./run.js").Run} run
+ * @param {Run} run
  * @param {(done: number, of: number) => void} tell
  * @returns {Promise<Blob>}
  */
-export function makeVideo(run, tell) {
-  return encodes ? encodeVideo(run, tell) : makeJpegs(run, tell);
+export async function makeVideo(run, tell) {
+  const canvas = document.createElement("canvas");
+  const { codec, chunks } = await (encodes ? encodeVideo : makeJpegs)(run, canvas, tell);
+  const { width, height } = canvas;
+  const lastFrame = 1000 / (run.source.rate ?? 25);
+  return matroska({ codec, width, height }, chunks, chunks[chunks.length - 1].time + lastFrame);
 }
