@@ -2,54 +2,46 @@
 
 import { canvas } from "./dom.js";
 import { FRAMES, HEIGHT, WIDTH, drawScene } from "./scene.js";
-import { PARTICLES, PARTICLES_EVERY, ROWS } from "./welcome-rows.js";
+import { paintBox } from "./stage.js";
+import { PARTICLES, ROWS } from "./welcome-rows.js";
 
 const FRAMES_A_SECOND = 30;
 /** The still for those who do not want motion. */
 const STILL = 150;
-const COLOR = "#3ddc97";
-const LOST = "#ffb4a8";
+/** Of a box to its width. */
+const HEIGHT_OF_BOX = 73 / 128;
+/** Frames that have the same particles, and how many they are. */
+const [EVERY, SHOWN] = [4, 16];
 
-/** What the tracker gave, in pixels of the scene: numbers of two places to the base 36, in tenths of their box's unit.
+/** What the tracker gave, in pixels of the scene.
  * @param {number} frame */
-export function rowOf(frame) {
-  const [x, y, width, height, score] = Array.from({ length: 5 }, (_, at) => {
-    return parseInt(ROWS.slice(10 * frame + 2 * at, 10 * frame + 2 * at + 2), 36);
-  });
-  return { box: { x: x / 2, y: y / 2, width: width / 2, height: height / 2 }, score: score / 1000 };
+export function boxOf(frame) {
+  const [x, y, width] = [0, 2, 4].map((at) => 6 * frame + at).map((at) => parseInt(ROWS.slice(at, at + 2), 36) / 2);
+  return { x, y, width, height: width * HEIGHT_OF_BOX };
 }
 
-/** Places from the middle of the box, likeliest first.
+/** Places from the middle of the box, likeliest first. The first frames have none.
  * @param {number} frame */
 function particlesOf(frame) {
-  const text = PARTICLES[Math.floor(frame / PARTICLES_EVERY)] ?? "";
-  const value = (/** @type {number} */ at) => (text.charCodeAt(at) - 80) * 2;
-  return Array.from({ length: text.length / 2 }, (_, at) => [value(2 * at), value(2 * at + 1)]);
+  const from = (Math.floor(frame / EVERY) - 1) * SHOWN;
+  const value = (/** @type {number} */ at) => (PARTICLES.charCodeAt(at) - 80) * 2;
+  return Array.from({ length: from < 0 ? 0 : SHOWN }, (_, at) => [value(2 * (from + at)), value(2 * (from + at) + 1)]);
 }
 
 /** @param {CanvasRenderingContext2D} context
  * @param {number} frame */
 function paint(context, frame) {
   drawScene(context, frame);
-  const { box, score } = rowOf(frame);
+  const box = boxOf(frame);
   const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
-  particlesOf(frame).forEach(([right, down], at, all) => {
-    const share = 1 - at / all.length;
+  particlesOf(frame).forEach(([right, down], at) => {
+    const share = 1 - at / SHOWN;
     context.fillStyle = `hsl(${190 - 140 * share} 95% 62% / ${0.25 + 0.5 * share})`;
     context.beginPath();
     context.arc(x + right, y + down, 1.5 + 2.5 * share, 0, 7);
     context.fill();
   });
-  const isLost = score < 0.25;
-  context.setLineDash(isLost ? [8, 6] : []);
-  for (const [line, style] of /** @type {const} */ ([[3.5, "#00000088"], [1.75, isLost ? LOST : COLOR]])) {
-    context.lineWidth = line;
-    context.strokeStyle = style;
-    context.strokeRect(box.x, box.y, box.width, box.height);
-  }
-  context.setLineDash([]);
-  context.fillStyle = isLost ? LOST : COLOR;
-  context.fillRect(box.x, box.y - 6, box.width * Math.min(1, score), 2.5);
+  paintBox(context, { box, color: "#3ddc97", name: "", isLost: false, isChosen: true }, 0.75);
 }
 
 /** Plays the clip as long as the first screen is shown. */

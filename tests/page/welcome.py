@@ -35,8 +35,8 @@ TRACK = """async (canvas, [box, seed]) => {
     return answers;
 }"""
 RECORDED = """async (canvas) => {
-    const { rowOf } = await import("/page/welcome.js");
-    return Array.from({ length: 240 }, (_, frame) => rowOf(frame).box);
+    const { boxOf } = await import("/page/welcome.js");
+    return Array.from({ length: 240 }, (_, frame) => boxOf(frame));
 }"""
 IS_BLANK = "canvas => canvas.toDataURL() === canvas.cloneNode().toDataURL()"
 SEED = 7
@@ -54,29 +54,23 @@ def two(value):
 
 def written(answers):
     """The module with the rows."""
-    rows = "".join(
-        "".join(two(2 * answer["box"][side]) for side in ("x", "y", "width", "height")) + two(1000 * answer["score"])
-        for answer in answers
-    )
-    texts = []
-    for answer in answers[::EVERY]:
+    rows = "".join(two(2 * answer["box"][side]) for answer in answers for side in ("x", "y", "width"))
+    signs = ""
+    for answer in answers[EVERY::EVERY]:
         box = answer["box"]
         x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-        signs = ""
         for across, down, *_ in answer["particles"][:SHOWN]:
             signs += "".join(chr(80 + max(-44, min(44, round(value / 2)))) for value in (across - x, down - y))
-        texts.append(signs.replace("\\", "]"))
-    lines = "\n".join(f'  "{text}",' for text in texts)
+    signs = signs.replace("\\", "]")
     return f"""// What the tracker gave of the clip of the first screen. Written by tests/page/welcome.py.
 
-/** Frame by frame x, y, width and height in halves of pixels, and the score in thousandths: two places to the base 36. */
+/** Frame by frame x, y and width in halves of pixels: two places to the base 36. */
 export const ROWS =
   "{rows}";
-export const PARTICLES_EVERY = {EVERY};
-/** The likeliest particles of every fourth frame: places from the middle of the box in pixels / 2 + 80, as characters. */
-export const PARTICLES = [
-{lines}
-];
+/** The likeliest particles of every fourth frame after the first, as characters: places from the middle of the box in
+ * pixels / 2 + 80. */
+export const PARTICLES =
+  "{signs}";
 """
 
 
