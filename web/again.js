@@ -143,7 +143,7 @@ export async function catchUp(run, object, last = run.lastFrame) {
  * @param {Run} run
  * @param {Source} source That of the run, or another one of the same frames.
  */
-export async function goOn(run, source) {
+async function goOn(run, source) {
   if (source !== run.source) {
     run.passedOver += run.source.skipped;
     run.source.close?.();
@@ -159,4 +159,26 @@ export async function goOn(run, source) {
     await source.goTo?.(run.picture.time, run.picture.frame);
   });
   if (!run.isOver && !run.isResting) run.play();
+}
+
+/** Goes on with a run that has stopped.
+ * @param {Run} run
+ * @param {() => Promise<Source>} open */
+export async function wake(run, open) {
+  const own = run.wake;
+  if (!own) return;
+  run.wake = undefined;
+  try {
+    const source = await open();
+    // It was stopped again meanwhile.
+    if (run.wake || run.isOver) return source === run.source ? undefined : source.stop();
+    await goOn(run, source);
+  } catch (error) {
+    // It can be tried again; where the run has failed meanwhile, with the source opened anew.
+    run.wake ??= own;
+    run.failure = error;
+    run.isResting = true;
+    run.leaveSessions();
+    throw error;
+  }
 }

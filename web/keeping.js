@@ -101,12 +101,12 @@ export class Keeping {
     const { files = [], name, imageNames } = run.source;
     const clip = clipOf(run.source);
     if (!clip && files.length === 0) return;
-    run.wake = () =>
-      wake(run, async () => {
-        const source = await (clip ? openClip(clip) : openFiles(files, imageNames));
-        await source.first();
-        return Object.assign(source, { name, imageNames });
-      });
+    const open = async () => {
+      const source = await (clip ? openClip(clip) : openFiles(files, imageNames));
+      await source.first();
+      return Object.assign(source, { name, imageNames });
+    };
+    run.wake = async () => (await again()).wake(run, open);
   }
 
   /** @param {string} text Of what is here; empty where nothing is kept of it. */
@@ -213,7 +213,7 @@ export class Keeping {
     };
     // Another tab may have it open where browsers do not tell: then this one has a copy.
     const own = isOwn || navigator.locks ? id : undefined;
-    await this.page.opening.choose(open, (run) => this.resume(run, project, states, own));
+    await this.page.opening.choose(open, async (run) => (await projects()).resume(this, run, project, states, own));
     if (this.id !== id) giveUp(id);
   }
 
@@ -222,34 +222,6 @@ export class Keeping {
    * @returns {Promise<boolean>} Whether it did. */
   async take(files) {
     return (await projects()).take(this, files);
-  }
-
-  /** Brings what was tracked into a run.
-   * @param {Run} run
-   * @param {Project} project
-   * @param {Kept["states"]} states
-   * @param {string} [id] Its entry.
-   * @returns {Promise<boolean>} Not where there is nothing: it waits for a first box. */
-  async resume(run, project, states, id) {
-    if (project.objects.length === 0) return false;
-    const left = this.arrived(id);
-    (await projects()).adopt(run, project);
-    for (const object of run.objects) object.saves = [states[object.number]].filter((state) => !!state);
-    const last = run.frames.numbers.pop();
-    run.picture = (last !== undefined && (await run.frames.at(last))) || run.picture;
-    run.isResting = true;
-    const { source } = run;
-    // Also where the video is not at hand: it may be chosen later.
-    if (!project.ended) run.wake = () => wake(run, async () => source);
-    const canGoOn = run.wake && source.goTo;
-    if (run !== this.page.run) return true;
-    this.page.enter(canGoOn ? "paused" : "ended");
-    this.page.seen.figures(run);
-    this.page.repaint();
-    const wanted = source.isLive ? " Pictures of the camera are not kept." : ` Choose ${source.name} to see its pictures.`;
-    this.page.say(`${source.name} is here again, with ${run.tracked} frames.${source.isAbsent ? wanted : ""}${left}`);
-    this.changed();
-    return true;
   }
 }
 
@@ -267,25 +239,4 @@ const clipOf = ({ name, files }) => CLIPS.find((clip) => clip === name && !files
  * @param {Source} source */
 function smallFiles({ files = [] }) {
   return files.reduce((sum, { size }) => sum + size, 0) <= MOST_BYTES ? files : [];
-}
-
-/** Goes on with the frames after the last one.
- * @param {Run} run
- * @param {() => Promise<Source>} open */
-async function wake(run, open) {
-  const own = run.wake;
-  run.wake = undefined;
-  try {
-    const source = await open();
-    // It was stopped again meanwhile.
-    if (run.wake || run.isOver) return source === run.source ? undefined : source.stop();
-    await (await again()).goOn(run, source);
-  } catch (error) {
-    // It can be tried again; where the run has failed meanwhile, with the source opened anew.
-    run.wake ??= own;
-    run.failure = error;
-    run.isResting = true;
-    run.leaveSessions();
-    throw error;
-  }
 }

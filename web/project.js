@@ -1,6 +1,7 @@
 // A project: the objects with their rows, and what is known of the video. It is a file that people keep, and what the
 // browser keeps of a page.
 
+import { wake } from "./again.js";
 import { FollowedObject } from "./objects.js";
 import { openFiles } from "./sources.js";
 
@@ -61,7 +62,7 @@ function readProject(document) {
 /** Brings objects and rows into a run that has none.
  * @param {Run} run
  * @param {Project} project */
-export function adopt(run, project) {
+function adopt(run, project) {
   for (const [at, { number = at, name, color, shown, rows }] of project.objects.entries()) {
     const object = new FollowedObject(Number(number), run.follower());
     object.name = String(name ?? object.name);
@@ -78,6 +79,35 @@ export function adopt(run, project) {
   run.chosen = run.objects[0];
   run.tracked = run.frames.times.size;
   run.passedOver = project.skipped || 0;
+}
+
+/** Brings what was tracked into a run.
+ * @param {Keeping} keeping
+ * @param {Run} run
+ * @param {Project} project
+ * @param {Kept["states"]} states
+ * @param {string} [id] Its entry.
+ * @returns {Promise<boolean>} Not where there is nothing: it waits for a first box. */
+export async function resume(keeping, run, project, states, id) {
+  if (project.objects.length === 0) return false;
+  const left = keeping.arrived(id);
+  adopt(run, project);
+  for (const object of run.objects) object.saves = [states[object.number]].filter((state) => !!state);
+  const last = run.frames.numbers.pop();
+  run.picture = (last !== undefined && (await run.frames.at(last))) || run.picture;
+  run.isResting = true;
+  const { source } = run;
+  // Also where the video is not at hand: it may be chosen later.
+  if (!project.ended) run.wake = () => wake(run, async () => source);
+  const canGoOn = run.wake && source.goTo;
+  if (run !== keeping.page.run) return true;
+  keeping.page.enter(canGoOn ? "paused" : "ended");
+  keeping.page.seen.figures(run);
+  keeping.page.repaint();
+  const wanted = source.isLive ? " Pictures of the camera are not kept." : ` Choose ${source.name} to see its pictures.`;
+  keeping.page.say(`${source.name} is here again, with ${run.tracked} frames.${source.isAbsent ? wanted : ""}${left}`);
+  keeping.changed();
+  return true;
 }
 
 /** A source for rows whose video is not at hand: its pictures are empty.
@@ -161,13 +191,13 @@ async function takeVideo(keeping, run, files) {
     const source = await openFiles(files);
     return isAbsent && source.name === name ? fitting(source, project) : source;
   };
-  const resume = async (/** @type {Run} */ opened) => {
+  const bringBack = async (/** @type {Run} */ opened) => {
     const [{ source }, [file] = []] = [opened, opened.source.files];
     const isRenamed = file?.size === gone?.size && file?.lastModified === gone?.lastModified;
     const isSame = isAbsent || isRenamed || source.name === name;
-    return isSame && !unlike(source, project) && keeping.resume(opened, project, states, id);
+    return isSame && !unlike(source, project) && resume(keeping, opened, project, states, id);
   };
-  await keeping.page.opening.choose(open, resume);
+  await keeping.page.opening.choose(open, bringBack);
 }
 
 /**
@@ -183,5 +213,5 @@ async function openProject(keeping, file, files) {
     project = readProject(await read.catch(() => Promise.reject(new Error(`${file.name} is no JSON.`))));
     return files.length > 0 ? fitting(await openFiles(files), project) : withoutVideo(project);
   };
-  await keeping.page.opening.choose(open, (run) => keeping.resume(run, project, {}));
+  await keeping.page.opening.choose(open, (run) => resume(keeping, run, project, {}));
 }
