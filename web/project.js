@@ -59,12 +59,22 @@ function readProject(document) {
   return { ...project, objects: objects.filter(({ rows }) => rows.length > 0) };
 }
 
+/** The numbers of the objects, each once: one that has none, or that of another, is counted on from the highest.
+ * @param {Project} project */
+function ownNumbers({ objects }) {
+  const numbers = objects.map(({ number }, at) => Number(number ?? at));
+  const isOwn = numbers.map((number, at) => Number.isInteger(number) && number >= 0 && numbers.indexOf(number) === at);
+  let last = Math.max(-1, ...numbers.filter((_, at) => isOwn[at]));
+  return numbers.map((number, at) => (isOwn[at] ? number : (last += 1)));
+}
+
 /** Brings objects and rows into a run that has none.
  * @param {Run} run
  * @param {Project} project */
 function adopt(run, project) {
-  for (const [at, { number = at, name, color, shown, rows }] of project.objects.entries()) {
-    const object = new FollowedObject(Number(number), run.follower());
+  const numbers = ownNumbers(project);
+  for (const [at, { name, color, shown, rows }] of project.objects.entries()) {
+    const object = new FollowedObject(numbers[at], run.follower());
     object.name = String(name ?? object.name);
     object.color = String(color ?? object.color);
     object.isShown = shown !== false;

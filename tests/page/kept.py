@@ -351,6 +351,31 @@ def project_of_rows_alone(checks):
     page.context.close()
 
 
+def project_of_one_number(checks):
+    """Two objects of a project that one wrote by hand have one number: each is a target of its own."""
+    path = checks.files.file("clip.mp4", 30, H264)
+    card, other = checks.files.truth[0], [20, 20, 60, 60]
+    objects = [
+        {"number": 3, "name": name, "rows": [[0, 0, *box, 1, "tracking", 1]]}
+        for name, box in (("card", card), ("ground", other), ("sky", [200, 20, 60, 60]))
+    ]
+    objects[2]["number"] = -1
+    video = {"name": "clip.mp4", "width": 1056, "height": 792}
+    project = checks.files.folder / "numbers.bagtrack.json"
+    project.write_text(json.dumps({"bagtrack_project": 1, "video": video, "objects": objects}))
+    page = checks.page(where="here")
+    page.locator("#file").set_input_files([project, path])
+    said(page, "clip.mp4 is here again, with 1 frames.")
+    targets = lambda: {(row["target"], row["name"]) for row in rows(page)}
+    assert targets() == {("3", "card"), ("4", "ground"), ("5", "sky")}, targets()
+    page.get_by_role("button", name="Delete ground").click()
+    page.get_by_label("Choose card").check()
+    page.locator("#undo").click()
+    said(page, "The last change to ground is undone")
+    assert targets() == {("3", "card"), ("4", "ground"), ("5", "sky")}, targets()
+    page.context.close()
+
+
 READ_LATE = """() => {
     const own = Blob.prototype.text;
     let isRead;
@@ -496,6 +521,7 @@ ALL = [
     half_tracked_project,
     project_without_objects,
     project_of_rows_alone,
+    project_of_one_number,
     refused_project_overtaken,
     project_of_many_rows,
     nothing_may_be_kept,
