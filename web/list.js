@@ -1,5 +1,7 @@
 // The list of objects.
 
+import { get } from "./dom.js";
+
 /**
  * @typedef {object} Told
  * @property {(object: FollowedObject) => void} choose
@@ -18,6 +20,8 @@ export class ObjectList {
     this.told = told;
     /** @type {Map<FollowedObject, HTMLElement>} */
     this.items = new Map();
+    /** @type {WeakSet<FollowedObject>} Those that were deleted. */
+    this.deleted = new WeakSet();
   }
 
   /**
@@ -32,8 +36,9 @@ export class ObjectList {
       const item = this.item(object);
       items.set(object, item);
       place.insertBefore(item, place.children[at]);
-      // It comes back: Enter would delete the one beside it.
-      if (place.querySelector(".remove:focus-visible")) item.querySelector("input")?.focus();
+      // It comes back: Enter would delete the one beside it. Only a new one is no reason to move.
+      const isBack = this.deleted.has(object) && document.querySelector("#list .remove:focus-visible, #add:focus-visible");
+      if (isBack) item.querySelector("input")?.focus();
     });
     [...place.children].forEach((item, at) => item.classList.toggle("chosen", objects[at] === chosen));
     place.querySelectorAll("input[type=radio]").forEach((radio, at) => {
@@ -41,7 +46,7 @@ export class ObjectList {
     });
   }
 
-  /** Where it had the focus, the one beside it gets that.
+  /** Where it had the focus, the one beside it gets that; without one the button that adds another.
    * @param {FollowedObject} object
    * @param {HTMLElement} item */
   remove(object, item) {
@@ -50,7 +55,8 @@ export class ObjectList {
     const hadFocus = item.querySelector(":focus-visible");
     item.remove();
     this.items.delete(object);
-    if (hadFocus) /** @type {HTMLElement | null} */ (beside?.lastElementChild)?.focus();
+    this.deleted.add(object);
+    if (hadFocus) /** @type {HTMLElement} */ (beside?.lastElementChild ?? get("add")).focus();
   }
 
   /** @param {FollowedObject} object */

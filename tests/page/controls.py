@@ -3,7 +3,7 @@
 import json
 import time
 
-from browser import TO_THE_END, choose, corners, drag, frames, said, saved, to_the_end
+from browser import DRAW, TO_THE_END, choose, corners, drag, frames, held, said, saved, to_the_end
 from studio import shown, to_frame
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True, "device_scale_factor": 2}
@@ -65,6 +65,36 @@ def objects_by_keyboard(checks):
     page.locator("#list button.remove").first.click()
     page.keyboard.press("Space")
     assert page.locator("#list li").count() == 2
+    page.context.close()
+
+
+def focus_in_the_list(checks):
+    """An object that is new after a while leaves the focus where one has gone meanwhile. Where the last one is deleted by
+    keyboard, the focus is beside it, and comes back with it."""
+    page = checks.page(where="here")
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 20)
+    page.locator("#pause").click()
+    to_frame(page, 10)
+    release = held(page, 5)
+    page.locator("#add").click()
+    drag(page, [30, 200, 80, 60])
+    said(page, "Following anew: frame 1")
+    page.keyboard.press("Shift")
+    page.locator("#list button.remove").focus()
+    assert page.locator("#list button.remove:focus-visible").count() == 1
+    release()
+    page.get_by_label("Delete Object 2").wait_for()
+    assert page.evaluate(FOCUS) == "Delete Object 1", page.evaluate(FOCUS)
+    page.keyboard.press("Enter")
+    assert page.evaluate(FOCUS) == "Delete Object 2", page.evaluate(FOCUS)
+    page.keyboard.press("Enter")
+    said(page, DRAW)
+    assert page.evaluate(FOCUS) == "add", page.evaluate(FOCUS)
+    page.keyboard.press("Control+z")
+    page.get_by_label("Delete Object 2").wait_for()
+    assert page.evaluate(FOCUS) == "Choose Object 2", page.evaluate(FOCUS)
     page.context.close()
 
 
@@ -169,4 +199,4 @@ def drag_that_does_not_end(checks):
     page.context.close()
 
 
-ALL = [objects_by_keyboard, keyboard_of_other_letters, second_finger, drag_that_does_not_end]
+ALL = [objects_by_keyboard, focus_in_the_list, keyboard_of_other_letters, second_finger, drag_that_does_not_end]
