@@ -1,5 +1,7 @@
 // The frames that were tracked: their times, and the pictures of as many as memory allows.
 
+import { GONE, isReadable } from "./problems.js";
+
 /** Most bytes of pictures. */
 const MOST_BYTES = 512 << 20;
 
@@ -15,6 +17,8 @@ export class Frames {
     /** @type {Map<number, Blob>} */
     this.blobs = new Map();
     this.bytes = 0;
+    /** Is told where a picture cannot be had. */
+    this.failed = (/** @type {unknown} */ _) => {};
   }
 
   /** All numbers, ascending. */
@@ -53,8 +57,25 @@ export class Frames {
   async at(frame) {
     const [time, blob] = [this.times.get(frame), this.blobs.get(frame)];
     if (time === undefined) return undefined;
-    if (blob) return { blob, time, frame, image: await createImageBitmap(blob) };
-    return this.source.at?.(frame, time);
+    if (!blob) return this.read(frame, time);
+    const image = await createImageBitmap(blob).catch(async (error) => {
+      // It may be a file.
+      return this.fail((await isReadable(blob)) ? error : GONE);
+    });
+    return { blob, time, frame, image };
+  }
+
+  /** @param {number} frame
+   * @param {number} time */
+  read(frame, time) {
+    return this.source.at?.(frame, time).catch((error) => this.fail(error));
+  }
+
+  /** @param {unknown} error
+   * @returns {never} */
+  fail(error) {
+    this.failed(error);
+    throw error;
   }
 
   /** The one before a frame: one that was tracked, or one of the source.
@@ -65,7 +86,7 @@ export class Frames {
     if (known !== undefined) return this.at(known);
     const time = this.times.get(frame);
     if (frame < 1 || !source.at || !source.rate || time === undefined) return undefined;
-    return source.at(frame - 1, Math.max(0, time - 1 / source.rate));
+    return this.read(frame - 1, Math.max(0, time - 1 / source.rate));
   }
 }
 

@@ -1,6 +1,6 @@
 // Images as the frames of a video, in the order of their names.
 
-import { UnplayableError } from "./problems.js";
+import { GONE, UnplayableError, isReadable } from "./problems.js";
 import { LONGEST_SIDE, drawScaled, encoded } from "./source.js";
 import { Stills } from "./stills.js";
 
@@ -100,8 +100,7 @@ export async function openImages(files, names) {
     const shown = await picture(index).catch(() => undefined);
     const { name } = images[index];
     if (!shown) {
-      // Fails where the file is gone.
-      await images[index].slice(0, 1).arrayBuffer();
+      if (!(await isReadable(images[index]))) throw GONE;
       const hint = /\.(jpe?g|png)$/i.test(name) ? "" : " JPEG and PNG open in all.";
       throw new Error(`${name} is not an image that this browser can read.${hint}`);
     }

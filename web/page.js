@@ -108,7 +108,7 @@ export class Page {
   /** @param {unknown} error
    * @param {() => void} [again] Makes it anew, with a key.
    * @param {string} [way] What one can do without one. */
-  fail(error, again, way = "") {
+  fail(error, again, way = this.wayBack(error)) {
     this.again = again;
     const wantsKey = error instanceof Problem && error.slug === "unauthorized";
     if (wantsKey) {
@@ -129,10 +129,15 @@ export class Page {
     this.enter("ended");
     this.repaint();
     this.changed();
-    const { isGone, source } = this.run ?? {};
-    const name = source?.files?.[1] ? "the images" : source?.name;
     if (this.canGoOn) this.fail(error, () => this.player.goOn(), GO_ON);
-    else this.fail(error, undefined, ` Choose ${isGone ? name : "the video or the camera"} again.`);
+    else this.fail(error, undefined, this.wayBack(error) || " Choose the video or the camera again.");
+  }
+
+  /** What one can do where the run's file is gone.
+   * @param {unknown} error */
+  wayBack(error) {
+    const { failure, isGone, source } = this.run ?? {};
+    return isGone && error === failure ? ` Choose ${source?.files?.[1] ? "the images" : source?.name} again.` : "";
   }
 
   reset() {

@@ -9,9 +9,9 @@ const UNREADABLE = "The file cannot be read: it was moved, changed or removed.";
 export const isUnreadable = (error) => error instanceof Error && WORDS[error.name] === UNREADABLE;
 export const GONE = new DOMException("", "NotReadableError");
 
-/** Whether a file that was chosen can still be read.
- * @param {File} file */
-export const isReadable = (file) => file.slice(0, 1).arrayBuffer().then(() => true, () => false);
+/** Whether a file that was chosen can still be read. Of one that was removed some browsers give a part without bytes.
+ * @param {Blob} file */
+export const isReadable = (file) => (file.size > 0 ? file.slice(0, 1) : file).arrayBuffer().then(() => true, () => false);
 
 const PART = "A part of the page cannot be loaded. Is the service still running? Then load the page anew.";
 

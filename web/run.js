@@ -28,6 +28,7 @@ export class Run {
     /** How many there were. */
     this.count = 0;
     this.frames = new Frames(source);
+    this.frames.failed = (error) => this.lose(error);
     /** How many frames were tracked. */
     this.tracked = 1;
     this.pace = new Pace();
@@ -236,8 +237,8 @@ export class Run {
       this.isRedoing = false;
       this.leaveSessions();
       this.throttle();
+      this.checkEnd();
     }
-    this.checkEnd();
   }
 
   checkEnd() {
@@ -252,6 +253,16 @@ export class Run {
     this.rest();
     if (this.source.isFetched || this.isGone) this.told.rest(this.failure);
     else this.told.fail(this.failure);
+  }
+
+  /** The picture of an earlier frame cannot be had. A file that is gone has no more frames, either.
+   * @param {unknown} error */
+  lose(error) {
+    if (this.isOver || !isUnreadable(error)) return;
+    this.failure = error;
+    if (!this.isResting) this.checkEnd();
+    else if (this.wake) this.told.rest(error);
+    else this.told.fail(error);
   }
 
   /** @param {unknown} error */

@@ -87,7 +87,7 @@ export class Seen {
     this.shown = object;
     this.bagShownAt = 0;
     const row = [...object.rows.values()].find(({ corrected }) => corrected);
-    const picture = row && (await run.frames.at(row.frame));
+    const picture = row && (await run.frames.at(row.frame).catch(() => undefined));
     if (!picture) return;
     if (this.shown === object) copyPatch(canvas("first-patch"), picture.image, scaled(row.box, picture.image, run.source.size));
     close(picture);

@@ -4,9 +4,9 @@ import json
 import os
 import statistics
 
-from browser import DRAW, distance, drag, drawn_frames, frames, kept_rows, rows, said, saved, slow, stop, to_the_end
-from browser import was_said
-from clips import FRAMES, H264, SIZE, VP8, frame_numbers, run
+from browser import DRAW, distance, drag, drawn_frames, frames, kept_rows, rows, said, saved, say_nothing, slow, stop
+from browser import to_the_end, was_said
+from clips import DRAWN, FRAMES, H264, SIZE, VP8, frame_numbers, run
 from service import Line, Service
 
 SENT = (960, 720)
@@ -314,6 +314,37 @@ HOLE = 600 << 20
 """Bytes of nothing: more than a browser reads ahead, and than the page copies. They take no room on the disk."""
 
 
+def picture_that_is_gone(checks):
+    """Where the picture of an earlier frame cannot be read again, the file is to be chosen again: it takes the place of
+    the one that is gone, and nothing is asked of what reads no more. So with a folder of images."""
+    whole = checks.files.file("large.mp4", 30, (*H264, "-b:v", "30M", "-g", "20"), turned="noise=alls=20:allf=t")
+    path = checks.files.folder / "gone.mp4"
+    drawn = {checks.files.folder / f"gone{at}.jpg": checks.files.folder / f"img/{at + 1:04}.jpg" for at in range(6)}
+    for copies, size, count, name in (({path: whole}, SIZE, 41, "gone.mp4"), (drawn, DRAWN, 6, "the images")):
+        for copy, file in copies.items():
+            copy.write_bytes(file.read_bytes())
+        first, *_ = copies
+        table = [[frame, frame / 30, 10, 10, 60, 60, 0.9, "tracking", int(frame == 0)] for frame in range(count)]
+        video = {"name": first.name, "width": size[0], "height": size[1]}
+        project = checks.files.folder / "gone.bagtrack.json"
+        project.write_text(json.dumps({"bagtrack_project": 1, "video": video, "objects": [{"rows": table}]}))
+        page = checks.page(where="here", allowed=("Failed to load",))
+        page.locator("#file").set_input_files([project, *copies])
+        said(page, f"{first.name} is here again")
+        for copy in copies:
+            copy.unlink()
+        page.locator("#back").click()
+        said(page, f"The file cannot be read: it was moved, changed or removed. Choose {name} again.")
+        assert page.locator("#resume").is_hidden() and page.locator("body[data-state=ended]").count() == 1
+        for copy, file in copies.items():
+            copy.write_bytes(file.read_bytes())
+        say_nothing(page)
+        page.locator("#file").set_input_files(list(copies))
+        said(page, f"{first.name} is here again, with {count} frames.")
+        assert len(rows(page)) == count
+        page.context.close()
+
+
 def holed_file(checks, name):
     """A video whose last part lies far behind the others."""
     whole = checks.files.file("slow.mp4", 10, (*H264, "-b:v", "8M"), turned="noise=alls=20:allf=t")
@@ -387,6 +418,7 @@ ALL = [
     cut_in_its_first_frame,
     file_of_varying_rate,
     file_that_is_gone,
+    picture_that_is_gone,
     file_changed_after_a_stop,
     file_of_a_phone,
     file_with_corrections,
