@@ -111,10 +111,8 @@ export class Page {
   fail(error, again, way = this.wayBack(error)) {
     this.again = again;
     const wantsKey = error instanceof Problem && error.slug === "unauthorized";
-    if (wantsKey) {
-      get("key-form").hidden = false;
-      get("key").focus();
-    }
+    get("key-form").hidden = !wantsKey;
+    if (wantsKey) get("key").focus();
     this.say(words(error, this.hasKey) + (wantsKey ? "" : way), true);
     const hasEnded = this.run?.isResting && !this.run.wake;
     if (!hasEnded || !this.hasRows) return;
@@ -149,6 +147,7 @@ export class Page {
     this.editing.reset();
     this.seen.reset();
     get("handed").replaceChildren();
+    get("key-form").hidden = true;
     this.leave();
   }
 

@@ -414,6 +414,23 @@ def key_needed(checks):
     service.stop()
 
 
+def key_not_needed(checks):
+    """Who is asked for a key and chooses another source, which needs none, is asked no more."""
+    service = Service(checks.program, BAGTRACK_API_KEYS="page:0123456789abcdef")
+    page = checks.page(url=service.url, allowed=("401",))
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    said(page, "asks for an API key")
+    page.locator("#key-form").wait_for()
+    page.locator("#sources summary").click()
+    page.locator("#here").check()
+    page.locator("#leaves").click()
+    said(page, DRAW)
+    assert page.locator("#key-form").is_hidden()
+    page.context.close()
+    service.stop()
+
+
 def busy_service(checks):
     service = Service(checks.program, "--max-sessions", "1")
     box = ",".join(str(value) for value in checks.clips["card"]["truth"][0][:4])
@@ -440,6 +457,7 @@ ALL = [
     camera_refused,
     session_ended_elsewhere,
     key_needed,
+    key_not_needed,
     busy_service,
     *budgets.ALL,
     *controls.ALL,
