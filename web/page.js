@@ -19,6 +19,9 @@ import { Timeline } from "./timeline.js";
  *   from `following` on there are rows. What is shown in which state stands in the page, in `data-in` and `data-on`.
  */
 
+/** Frames that a timeline has room for from the beginning. */
+const LEAST_PART = 256;
+
 export class Page {
   constructor() {
     this.local = new LocalClient();
@@ -207,7 +210,7 @@ export class Page {
     const { run } = this;
     if (!run) return;
     this.stage.show(shown.image, shownIn(run, shown.frame, shown.image, run.chosen), particles);
-    this.timeline.show([...(run.chosen?.rows.values() ?? [])], run.lastFrame, shown.frame, wholeLength(run));
+    this.timeline.show([...(run.chosen?.rows.values() ?? [])], run.lastFrame, shown.frame, endOf(run));
     this.editing.list.show(run.objects, run.chosen);
     this.editing.show();
     this.seen.score(run.chosen?.rows.get(shown.frame));
@@ -280,9 +283,11 @@ export class Page {
   }
 }
 
-/** About the last frame of a video that is still tracked, as far as is known.
+/** Where the timeline of a video that is still tracked ends: about at its last frame, as far as is known. Of a long video
+ * it has a part, which doubles as one comes to its end: one could hardly find a frame in what is tracked of it.
  * @param {Run} run */
-function wholeLength({ hasAll, source: { duration = 0, rate = 0 } }) {
+function endOf({ hasAll, lastFrame, source: { duration = 0, rate = 0 } }) {
   const last = Math.round(duration * rate);
-  return hasAll || !Number.isFinite(last) ? 0 : last;
+  const part = 2 ** Math.ceil(Math.log2(Math.max(LEAST_PART, 1.25 * lastFrame)));
+  return hasAll || !Number.isFinite(last) ? 0 : Math.min(last, part);
 }

@@ -69,9 +69,9 @@ export class Timeline {
    * @param {Row[]} rows Of the chosen object.
    * @param {number} last The last frame that was tracked.
    * @param {number} shown
-   * @param {number} whole About the last frame of the video. */
-  show(rows, last, shown, whole) {
-    Object.assign(this, { rows, last, shown, end: Math.max(last, whole, 1) });
+   * @param {number} end Where it ends, unless more frames were tracked. */
+  show(rows, last, shown, end) {
+    Object.assign(this, { rows, last, shown, end: Math.max(last, end, 1) });
     this.repaint();
   }
 

@@ -23,7 +23,7 @@ from browser import (
     slow,
     to_the_end,
 )
-from clips import H264
+from clips import H264, run
 from files import choose_file, sent_box
 from service import Service
 
@@ -114,6 +114,24 @@ def mouse_tells_a_frame(page):
         assert time.monotonic() < late, "it tells nothing"
         page.wait_for_timeout(50)
     assert timeline.get_attribute("aria-valuenow") == str(CORRECTED), "the mouse has moved it"
+
+
+def long_video(checks):
+    """Of a video of minutes so much of the timeline is tracked after a second that one can go to a frame in it."""
+    path = checks.files.folder / "long.mp4"
+    run("ffmpeg", "-v", "error", "-y", "-f", "lavfi", "-i", "testsrc=size=160x120:rate=30:duration=120", *H264, path)
+    page = checks.page(where="here")
+    choose_file(page, path)
+    slow(page)
+    drag(page, [20, 20, 60, 60])
+    frames(page, 20)
+    page.locator("#pause").click()
+    page.locator("#timeline").click(position={"x": 30, "y": 40})
+    page.locator("body[data-state=paused]").wait_for()
+    page.wait_for_timeout(300)
+    shown, last = (int(page.locator("#timeline").get_attribute(f"aria-value{name}")) for name in ("now", "max"))
+    assert 2 < shown < 15 and last >= 19, (shown, last)
+    page.context.close()
 
 
 def check_exports(page, table):
@@ -321,6 +339,7 @@ ALL = [
     objects_in_the_page,
     objects_with_the_service,
     tracked_backwards,
+    long_video,
     saved_to_the_service,
     long_names,
     seen_no_more,
