@@ -163,10 +163,10 @@ async function goOn(run, source) {
 
 /** Goes on with a run that has stopped.
  * @param {Run} run
- * @param {() => Promise<Source>} open */
-export async function wake(run, open) {
-  const own = run.wake;
-  if (!own) return;
+ * @param {() => Promise<Source>} open
+ * @param {Run["wake"]} own What was asked to: where the run has stopped again meanwhile, another one will be. */
+export async function wake(run, open, own = run.wake) {
+  if (!own || run.wake !== own) return;
   run.wake = undefined;
   try {
     const source = await open();

@@ -106,7 +106,9 @@ export class Keeping {
       await source.first();
       return Object.assign(source, { name, imageNames });
     };
-    run.wake = async () => (await again()).wake(run, open);
+    /** @type {() => Promise<void>} */
+    const own = async () => (await again()).wake(run, open, own);
+    run.wake = own;
   }
 
   /** @param {string} text Of what is here; empty where nothing is kept of it. */

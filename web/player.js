@@ -67,7 +67,7 @@ export class Player {
       const picture = await run.frames.at(frame).catch(() => undefined);
       const early = begun + 1000 * timeOf(frame) - performance.now();
       if (early > 0) await new Promise((resolve) => setTimeout(resolve, early));
-      if (!this.isPlaying || run !== page.run || run.isGone) break;
+      if (!this.isPlaying || run !== page.run || (!picture && run.isGone)) break;
       if (!picture) continue;
       const { viewed } = page;
       page.viewed = picture;

@@ -59,11 +59,12 @@ function readProject(document) {
   return { ...project, objects: objects.filter(({ rows }) => rows.length > 0) };
 }
 
-/** The numbers of the objects, each once: one that has none, or that of another, is counted on from the highest.
+/** The numbers of the objects, each once. One without a number has its place; one with that of another is counted on from
+ * the highest.
  * @param {Project} project */
 function ownNumbers({ objects }) {
   const numbers = objects.map(({ number }, at) => Number(number ?? at));
-  const isOwn = numbers.map((number, at) => Number.isInteger(number) && number >= 0 && numbers.indexOf(number) === at);
+  const isOwn = numbers.map((number, at) => Number.isSafeInteger(number) && number >= 0 && numbers.indexOf(number) === at);
   let last = Math.max(-1, ...numbers.filter((_, at) => isOwn[at]));
   return numbers.map((number, at) => (isOwn[at] ? number : (last += 1)));
 }
@@ -100,6 +101,8 @@ function adopt(run, project) {
  * @returns {Promise<boolean>} Not where there is nothing: it waits for a first box. */
 export async function resume(keeping, run, project, states, id) {
   if (project.objects.length === 0) return false;
+  // Another source was chosen while this module was loaded.
+  if (run !== keeping.page.run) return true;
   const left = keeping.arrived(id);
   adopt(run, project);
   for (const object of run.objects) object.saves = [states[object.number]].filter((state) => !!state);

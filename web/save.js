@@ -135,8 +135,10 @@ function goesOn({ hasAll, source }, { time }) {
   return !hasAll && source.duration !== undefined && time + 1.5 * interval < source.duration;
 }
 
-/** @param {string} text */
-const escaped = (text) => text.replace(/[<>&"]/g, (sign) => `&#${sign.charCodeAt(0)};`);
+/** XML has no control characters, and names of files may.
+ * @param {string} text */
+const escaped = (text) =>
+  text.replace(/[\0-\x1f\x7f-\x9f\ufffe\uffff]/g, "\ufffd").replace(/[<>&"]/g, (sign) => `&#${sign.charCodeAt(0)};`);
 
 /** A box of CVAT, which draws what lies between key frames, so each frame is one.
  * @param {Row} row

@@ -56,7 +56,7 @@ async function saveVideo(page) {
     const [kept, of] = [run.frames.shown.length, run.tracked];
     if (isHere() && kept < of) page.say(`The video has the last ${kept} of ${of} frames: no more are kept.`);
   } catch (error) {
-    if (isHere()) page.say(words(error, page.hasKey), true);
+    if (isHere()) page.fail(error);
   }
   if (isHere()) restore();
 }

@@ -128,7 +128,7 @@ def long_video(checks):
     page.locator("#pause").click()
     page.locator("#timeline").click(position={"x": 30, "y": 40})
     page.locator("body[data-state=paused]").wait_for()
-    page.wait_for_timeout(300)
+    page.wait_for_function("Number(document.getElementById('timeline').getAttribute('aria-valuenow')) < 15")
     shown, last = (int(page.locator("#timeline").get_attribute(f"aria-value{name}")) for name in ("now", "max"))
     assert 2 < shown < 15 and last >= 19, (shown, last)
     page.context.close()

@@ -59,6 +59,7 @@ def written(answers):
     for answer in answers[EVERY::EVERY]:
         box = answer["box"]
         x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        assert len(answer["particles"]) >= SHOWN
         for across, down, *_ in answer["particles"][:SHOWN]:
             signs += "".join(chr(80 + max(-44, min(44, round(value / 2)))) for value in (across - x, down - y))
     signs = signs.replace("\\", "]")

@@ -71,7 +71,7 @@ fn escaped(text: &str) -> String {
     for sign in text.chars() {
         match sign {
             '<' | '>' | '&' | '"' => escaped += &format!("&#{};", u32::from(sign)),
-            // XML has none of these, and a name of a file may.
+            // XML has no control characters, and names of files may.
             other if other.is_control() => escaped.push('\u{fffd}'),
             '\u{fffe}' | '\u{ffff}' => escaped.push('\u{fffd}'),
             other => escaped.push(other),

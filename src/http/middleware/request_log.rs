@@ -3,8 +3,8 @@
 //!
 //! The span has the ids of the request and of its trace, the client's address, the name of its API key (never the key),
 //! the method, where some call has it, and the path: never bytes or boxes, no more of the path than any route has, and of a
-//! session's id only its beginning. Probes come every few seconds, so they are logged where they are refused, or
-//! `debug` is asked for.
+//! session's id only its beginning. Probes come every few seconds: without `debug` only a refused one has a line,
+//! which names it, and none has a span.
 
 use super::client_identity::note_address;
 use super::count_requests::method_label;
@@ -34,10 +34,12 @@ pub async fn log_request(
     next: impl AsyncFnOnce(Request) -> Response,
 ) -> Response {
     let started = clock::now();
-    let is_probe = PROBES.contains(&request.uri().path());
+    let probe = PROBES
+        .into_iter()
+        .find(|path| *path == request.uri().path());
     let address = note_address(state, &mut request);
     let (span, context) = (
-        span(&request, is_probe, address),
+        span(&request, probe.is_some(), address),
         TraceContext::of(request.headers()),
     );
     #[cfg(feature = "otel")]
@@ -56,9 +58,9 @@ pub async fn log_request(
     let cause = problem.as_ref().and_then(Problem::cause);
     let (problem, cause) = (kind.map(Kind::slug), cause.as_deref());
     span.in_scope(|| match kind {
-        Some(Kind::Internal) => tracing::error!(status, ms, problem, cause, "answered"),
-        None if is_probe => tracing::debug!(status, ms, problem, cause, "answered"),
-        _ => tracing::info!(status, ms, problem, cause, "answered"),
+        Some(Kind::Internal) => tracing::error!(status, ms, probe, problem, cause, "answered"),
+        None if probe.is_some() => tracing::debug!(status, ms, "answered"),
+        _ => tracing::info!(status, ms, probe, problem, cause, "answered"),
     });
     response
 }

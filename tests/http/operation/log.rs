@@ -92,6 +92,8 @@ async fn a_line_tells_the_client_and_the_name_of_its_key_but_not_the_key() {
     };
     get("with-key", KEY).await;
     get("without", "another-key-of-somebody").await;
+    let probe = client.get(service.url("/metrics")).send().await.unwrap();
+    assert_eq!(probe.status(), 401);
     service.signal(Signal::TERM);
     let (_, log) = service.ends();
     let of = |id: &str| {
@@ -108,6 +110,9 @@ async fn a_line_tells_the_client_and_the_name_of_its_key_but_not_the_key() {
         of("with-key")
     );
     assert!(!of("without").contains(r#""key""#), "{}", of("without"));
+    // A refused probe is named.
+    let probe = log.iter().find(|line| line.contains("/metrics"));
+    assert!(probe.unwrap().contains("unauthorized"), "{probe:?}");
     let all = log.join("\n");
     assert!(!all.contains(KEY) && !all.contains("another-key"), "{all}");
 }

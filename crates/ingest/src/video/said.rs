@@ -131,9 +131,13 @@ impl Said {
 
 impl Heard {
     fn take(&mut self, line: &str) {
-        // The cache says on every start that it cannot know the length of a pipe. What cameras and editors note in an APP
-        // segment is not of the picture.
-        let noise = ["Last message repeated", "unable to decode APP fields"];
+        // The cache says on every start that it cannot know the length of a pipe. A note of a camera that is no Exif is
+        // passed over by its length.
+        let noise = [
+            "Last message repeated",
+            "invalid TIFF header in EXIF data",
+            "error decoding EXIF data",
+        ];
         let is_noise = noise.iter().any(|text| line.contains(text));
         if is_noise || line.starts_with("[cache @") || line.is_empty() || is_of_sound(line) {
             return;
@@ -290,8 +294,14 @@ mod tests {
             "[mp3float @ 0x1] Header missing",
         ];
         assert_eq!(fault(&sound), None);
-        let note = "[mjpeg @ 0x1] unable to decode APP fields: Invalid data found";
+        let note = "[mjpeg @ 0x1] mjpeg: invalid TIFF header in EXIF data";
         assert_eq!(fault(&[note]), None);
+        // The length of a segment is wrong: a thumbnail within it may be taken for the picture.
+        let segment = "[mjpeg @ 0x1] unable to decode APP fields: Invalid data";
+        assert_eq!(
+            fault(&[segment]),
+            damage("unable to decode APP fields: Invalid data")
+        );
         let failed = "[mjpeg @ 0x1] get_buffer() failed";
         assert_eq!(fault(&[failed]), Some(Fault::Memory));
         let size = "[h264 @ 0x1] [IMGUTILS @ 0x2] Picture size 0x0 is invalid";

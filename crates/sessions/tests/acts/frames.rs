@@ -63,8 +63,8 @@ async fn frames_are_answered_once_and_again_under_the_same_number() {
         let refused = post_numbered(&service, &session, number, files).await;
         assert_matches!(refused, Err(FramesError::Replay(error)) if *error == expected);
     }
-    // Without a number it is the next one.
-    let next = FrameBatch::posted(None, pictures(4..5), None);
+    // Without a number it is the next one, also with the bytes of the last.
+    let next = FrameBatch::posted(None, pictures(3..4), None);
     let next = post(&service, &session, next).await.unwrap();
     assert_eq!(next.estimates[0].first().frame, 4);
     assert_eq!(next.estimates[0], session.latest());
@@ -260,9 +260,12 @@ async fn the_last_answers_are_kept_and_more_where_that_is_asked_for() {
     let again = post_numbered(&service, &session, first, pictures(4..5));
     assert!(again.await.unwrap().replayed);
     let (got, expected) = (first - 1, last + 1);
-    let late = post_numbered(&service, &session, got, pictures(4..5)).await;
     let out_of_order = ReplayError::OutOfOrder { got, expected };
-    assert_matches!(late, Err(FramesError::Replay(error)) if *error == out_of_order);
+    // Nor where the answers to the later of them are kept.
+    for files in [pictures(4..5), [pictures(4..5), pictures(4..5)].concat()] {
+        let late = post_numbered(&service, &session, got, files).await;
+        assert_matches!(late, Err(FramesError::Replay(error)) if *error == out_of_order);
+    }
     assert_eq!(session.latest_frame(), last);
     let keeps = FrameBatch {
         min_answers: KEPT_ANSWERS + 2,
