@@ -386,12 +386,18 @@ def session_ended_elsewhere(checks):
     page.context.close()
 
 
-def key_needed(checks):
+def asked_for_a_key(checks):
+    """A page in which a first box is drawn, of a service that wants a key; and the service."""
     service = Service(checks.program, BAGTRACK_API_KEYS="page:0123456789abcdef")
     page = checks.page(url=service.url, allowed=("401",))
     choose(page, "card")
     drag(page, checks.clips["card"]["truth"][0])
     said(page, "asks for an API key")
+    return page, service
+
+
+def key_needed(checks):
+    page, service = asked_for_a_key(checks)
     checks.shot(page, "key-light")
     # The box stays while one types the key, and until the service has answered.
     painted(page, "overlay")
@@ -416,11 +422,7 @@ def key_needed(checks):
 
 def key_not_needed(checks):
     """Who is asked for a key and chooses another source, which needs none, is asked no more."""
-    service = Service(checks.program, BAGTRACK_API_KEYS="page:0123456789abcdef")
-    page = checks.page(url=service.url, allowed=("401",))
-    choose(page, "card")
-    drag(page, checks.clips["card"]["truth"][0])
-    said(page, "asks for an API key")
+    page, service = asked_for_a_key(checks)
     page.locator("#key-form").wait_for()
     page.locator("#sources summary").click()
     page.locator("#here").check()

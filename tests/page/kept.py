@@ -334,16 +334,22 @@ def project_without_objects(checks):
         page.context.close()
 
 
-def project_of_rows_alone(checks):
-    """Objects of a project that one wrote by hand, which has their rows alone, have names and numbers, and go on."""
+def opened_by_hand(checks, objects):
+    """A page with a project that one wrote by hand, and its video."""
     path = checks.files.file("clip.mp4", 30, H264)
-    objects = [{"rows": [[0, 0, *box, 1, "tracking", 1]]} for box in (checks.files.truth[0], [20, 20, 60, 60])]
     video = {"name": "clip.mp4", "width": 1056, "height": 792}
-    project = checks.files.folder / "rows.bagtrack.json"
+    project = checks.files.folder / "hand.bagtrack.json"
     project.write_text(json.dumps({"bagtrack_project": 1, "video": video, "objects": objects}))
     page = checks.page(where="here")
     page.locator("#file").set_input_files([project, path])
     said(page, "clip.mp4 is here again, with 1 frames.")
+    return page
+
+
+def project_of_rows_alone(checks):
+    """Objects of a project that one wrote by hand, which has their rows alone, have names and numbers, and go on."""
+    objects = [{"rows": [[0, 0, *box, 1, "tracking", 1]]} for box in (checks.files.truth[0], [20, 20, 60, 60])]
+    page = opened_by_hand(checks, objects)
     page.locator("#pause").click()
     to_the_end(page)
     assert {(row["target"], row["name"]) for row in rows(page)} == {("0", "Object 1"), ("1", "Object 2")}
@@ -353,19 +359,13 @@ def project_of_rows_alone(checks):
 
 def project_of_one_number(checks):
     """Two objects of a project that one wrote by hand have one number: each is a target of its own."""
-    path = checks.files.file("clip.mp4", 30, H264)
     card, other = checks.files.truth[0], [20, 20, 60, 60]
     objects = [
         {"number": 3, "name": name, "rows": [[0, 0, *box, 1, "tracking", 1]]}
         for name, box in (("card", card), ("ground", other), ("sky", [200, 20, 60, 60]))
     ]
     objects[2]["number"] = -1
-    video = {"name": "clip.mp4", "width": 1056, "height": 792}
-    project = checks.files.folder / "numbers.bagtrack.json"
-    project.write_text(json.dumps({"bagtrack_project": 1, "video": video, "objects": objects}))
-    page = checks.page(where="here")
-    page.locator("#file").set_input_files([project, path])
-    said(page, "clip.mp4 is here again, with 1 frames.")
+    page = opened_by_hand(checks, objects)
     targets = lambda: {(row["target"], row["name"]) for row in rows(page)}
     assert targets() == {("3", "card"), ("4", "ground"), ("5", "sky")}, targets()
     page.get_by_role("button", name="Delete ground").click()
