@@ -98,7 +98,7 @@ export class Editing {
     return this.tracksAgain(run, object, async (signal) => {
       const { trackOn } = await again();
       const isWhole = await trackOn(run, object, frame, box, { tell, signal });
-      const from = `Followed anew from frame ${frame}`;
+      const from = `Followed ${object ? "anew " : ""}from frame ${frame}`;
       return isWhole ? `${from}.` : `${from}, by the box alone: the service had lost what was learned before.`;
     });
   }

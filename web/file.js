@@ -171,15 +171,26 @@ export class VideoFile {
     const isGone = this.settling > time + SAME;
     this.settling = undefined;
     if (this.isStopped) return;
+    if (isGone) return this.takeGone(time);
     const image = drawFrame(this.video);
     // What looks the same may be the frame before, which is given away for longer than it is told of.
     const isSame = this.lastImage !== undefined && this.samePasses < SAME_PASSES && areEqual(image, this.lastImage);
     this.samePasses = isSame ? this.samePasses + 1 : 0;
     if (isSame) return this.retake();
-    if (isGone) return this.gaps.resume();
     this.interval = Math.min(this.interval, time - this.last.time);
     this.take(image, time, shown, true);
     this.adjust();
+  }
+
+  /** Goes back to the frame that has gone by before it was taken. On a busy machine each one would, when it is played.
+   * @param {number} time */
+  async takeGone(time) {
+    const shown = await this.playback.seek(time + SAME / 2);
+    if (this.isStopped) return;
+    if (!shown || Math.abs(shown.mediaTime - time) > SAME) return this.gaps.resume();
+    this.interval = Math.min(this.interval, time - this.last.time);
+    this.take(drawFrame(this.video), time, undefined);
+    this.gaps.goOnFrom(shown);
   }
 
   /** Goes back to the frame that was taken last: it or the next one was given away for the other. */

@@ -53,7 +53,8 @@ export class Gaps {
     if (gap.isOfTheFile) return isTold ? this.goOnFrom(shown) : this.resume();
     this.file.sinceGap = 0;
     video.playbackRate = Math.max(SLOWEST, video.playbackRate / 2);
-    const isNext = found !== undefined && found - last.time <= this.file.interval * GAP;
+    const { interval } = this.file;
+    const isNext = found !== undefined && interval < Infinity && found - last.time <= interval * GAP;
     if (found !== undefined && (isNext || (gap.passes > 1 && gap.passes < MOST_PASSES))) {
       // Where there is room for one frame only, there is no other one.
       const frames = await this.goBack({ image: drawFrame(video), time: found }, isNext);

@@ -389,6 +389,50 @@ def file_gone_over_plain_http(checks):
     service.stop()
 
 
+BUSY = """() => {
+    const { requestVideoFrameCallback: tell, pause } = HTMLVideoElement.prototype;
+    HTMLVideoElement.prototype.requestVideoFrameCallback = function (told) {
+        return tell.call(this, (now, frame) => {
+            if (this.paused || frame.presentedFrames % 3 === 0) told(now, frame);
+            else this.requestVideoFrameCallback(told);
+        });
+    };
+    HTMLVideoElement.prototype.pause = function () {
+        const late = performance.now() + 150;
+        while (performance.now() < late);
+        pause.call(this);
+    };
+}"""
+"""A browser that tells of each third frame only while it plays, and pauses late."""
+
+
+def played_on_a_busy_machine(checks):
+    """A file that is played gives each frame its number and its time where the browser passes frames over, from the
+    beginning on, and after it was chosen again."""
+    service = Service(checks.program, "--allowed-hosts", "machine.test")
+    browser = checks.launch("--host-resolver-rules=MAP machine.test 127.0.0.1")
+    allowed = ("Cross-Origin-Opener-Policy", "Failed to load")
+    page = checks.page(url=f"http://machine.test:{service.port}", browser=browser, where="here", allowed=allowed)
+    path = checks.files.folder / "busy.mp4"
+    whole = checks.files.file("clip.mp4", 30, H264).read_bytes()
+    path.write_bytes(whole)
+    page.evaluate(BUSY)
+    follow_file(checks, page, path)
+    frames(page, 10)
+    page.locator("#stop").click()
+    before = kept_rows(page)
+    page.reload()
+    said(page, "is here again")
+    page.evaluate(BUSY)
+    page.locator("#pause").click()
+    frames(page, len(before) + 10)
+    stop(page)
+    table = rows(page)
+    check_rows(table, path, checks.files.truth, range(len(table)), [number / 30 for number in range(len(table))])
+    browser.close()
+    service.stop()
+
+
 def plain_http(checks):
     """A page that came over http from another machine: no camera, no encoder of videos; the rest works."""
     service = Service(checks.program, "--allowed-hosts", "machine.test")
@@ -425,5 +469,6 @@ ALL = [
     service_killed,
     paused_past_the_expiry,
     plain_http,
+    played_on_a_busy_machine,
     file_gone_over_plain_http,
 ]

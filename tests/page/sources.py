@@ -51,7 +51,7 @@ def named_as_in_the_folder(page, added=None):
     if added:
         page.locator("#add").click()
         drag(page, added)
-        said(page, "Followed anew")
+        said(page, "Followed from frame")
         for name in page.locator("#list input[type=text]").all():
             name.fill("card")
     coco = json.loads(saved(page, "#save-coco"))
