@@ -6,6 +6,7 @@ import { Problem } from "./js/problem.js";
  * @typedef {object} Drawn A box until it is answered.
  * @property {Box} box
  * @property {FollowedObject | undefined} object Nothing for a new one.
+ * @property {() => void} refused Takes back what was noted of it.
  * @property {boolean} [isSent]
  */
 
@@ -33,6 +34,7 @@ export async function sendDrawn(run) {
   } catch (error) {
     // An object that cannot be added, or a box that cannot be followed, is no end of what is followed.
     const isRefused = !object || (error instanceof Problem && error.slug === "invalid-box");
+    if (isRefused) drawn.refused();
     if (isRefused && !run.isOver) run.told.refuse(error);
     else run.fail(error);
     isLeft = !isRefused;

@@ -82,8 +82,9 @@ export class Editing {
     this.add(false);
     if (this.page.viewed || run.isResting) return void this.trackOn(run, object, (this.page.viewed ?? run.picture).frame, box);
     // Its session learns of the box.
-    this.undoing.push({ ...this.undoing.before(run, object), follower: undefined });
-    run.draw(box, object);
+    const step = { ...this.undoing.before(run, object), follower: undefined };
+    this.undoing.push(step);
+    run.draw(box, object, () => this.undoing.drop(step));
     run.pause(this.page.state === "paused");
     this.page.say(object ? "The box is corrected." : "Following another object.");
   }
@@ -166,7 +167,6 @@ export class Editing {
   /** A box that was drawn in the last frame cannot be followed.
    * @param {unknown} error */
   refuse(error) {
-    this.undoing.steps.pop();
     this.page.say(words(error, this.page.hasKey), true);
     this.page.repaint();
   }

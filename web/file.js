@@ -5,8 +5,8 @@
 // the later of the two frames; where that is not the earlier one, the file is played from there again, more slowly.
 
 import { Delivery } from "./delivery.js";
-import { BEFORE, Gaps, SAME_PASSES } from "./gaps.js";
-import { Playback, SAME, areEqual, isEmpty, learnRate } from "./playback.js";
+import { Gaps, SAME_PASSES } from "./gaps.js";
+import { BEFORE, Playback, SAME, areEqual, isEmpty, learnRate } from "./playback.js";
 import { GONE, isReadable } from "./problems.js";
 import { addVideo, drawFrame, encoded, loaded } from "./source.js";
 
@@ -91,7 +91,7 @@ export class VideoFile {
    * @param {number} time
    * @param {number} [frame] Its number, where it is known. */
   async goTo(time, frame) {
-    this.learned ??= await learnRate(this.video);
+    this.learned ??= await learnRate(this.playback);
     // The times of rows are rounded, perhaps to before the frame.
     const sought = frame === undefined ? time : time + BEFORE;
     const shown = await this.playback.reach(Math.min(sought, this.duration));
@@ -177,7 +177,6 @@ export class VideoFile {
     const isSame = this.lastImage !== undefined && this.samePasses < SAME_PASSES && areEqual(image, this.lastImage);
     this.samePasses = isSame ? this.samePasses + 1 : 0;
     if (isSame) return this.retake();
-    this.interval = Math.min(this.interval, time - this.last.time);
     this.take(image, time, shown, true);
     this.adjust();
   }
@@ -188,8 +187,9 @@ export class VideoFile {
     const shown = await this.playback.seek(time + SAME / 2);
     if (this.isStopped) return;
     if (!shown || Math.abs(shown.mediaTime - time) > SAME) return this.gaps.resume();
-    this.interval = Math.min(this.interval, time - this.last.time);
-    this.take(drawFrame(this.video), time, undefined);
+    const image = drawFrame(this.video);
+    if (this.delivery.isAhead(image)) return this.retake();
+    this.take(image, time, undefined);
     this.gaps.goOnFrom(shown);
   }
 
@@ -212,6 +212,7 @@ export class VideoFile {
    * @param {boolean} [isDoubted] Whether the image may be that of the frame after it. */
   take(image, time, shown, isDoubted = false) {
     const frame = this.last.frame + 1;
+    this.interval = Math.min(this.interval, time - this.last.time);
     this.last = { frame, time, shown };
     this.lastImage = image;
     this.delivery.add({ image, time, frame }, isDoubted);

@@ -1,13 +1,11 @@
 // The times between two frames that a file has told of: whether there is another frame in one, and which.
 
-import { SAME, isTimeOf } from "./playback.js";
+import { BEFORE, SAME, isTimeOf } from "./playback.js";
 import { drawFrame } from "./source.js";
 
 /** A time between two frames of so many intervals is one that another frame may be in. */
 const GAP = 1.5;
 const SLOWEST = 0.25;
-/** What is looked at before a frame lies so far before it, in seconds. */
-export const BEFORE = 0.002;
 /** Most passes over a gap with frames in it. After the first one they are gone to, one by one. */
 const MOST_PASSES = 6;
 /** A gap that cannot be looked into, and is the same at so many passes, belongs to the file. */

@@ -37,6 +37,8 @@ export class Keeping {
     this.isSafe = false;
     /** @type {number | undefined} */
     this.timer = undefined;
+    /** How often the browser was to forget what is here. */
+    this.forgotten = 0;
     /** What was left for another source. */
     this.left = "";
     get("forget").addEventListener("click", () => this.forget());
@@ -57,7 +59,7 @@ export class Keeping {
   async keep() {
     clearTimeout(this.timer);
     this.timer = undefined;
-    const { id, page: { run } } = this;
+    const { id, forgotten, page: { run } } = this;
     if (!run) return false;
     try {
       if (run.objects.length === 0) return await this.keepNothing();
@@ -73,7 +75,7 @@ export class Keeping {
       const hasRoom = await keepWork(work, files);
       const hasFiles = files ? hasRoom && files.length > 0 : this.hasFiles;
       const isWhole = !!clip || hasFiles || source.isAbsent === true || run.isGone;
-      if (run !== this.page.run) return isWhole;
+      if (run !== this.page.run || forgotten !== this.forgotten) return isWhole;
       this.hasFiles = hasFiles;
       [this.source, this.store] = [source, store];
       this.isSafe = this.timer === undefined && isWhole;
@@ -123,6 +125,7 @@ export class Keeping {
     this.timer = undefined;
     this.source = undefined;
     this.isSafe = false;
+    this.forgotten += 1;
     this.tell("");
     await forget(this.id).catch(() => undefined);
     this.page.say("The browser has forgotten it.");

@@ -235,7 +235,8 @@ export class Page {
     this.changed();
     if (!answer) return;
     this.seen.take(run, shown, answer);
-    this.message.take(answer.status);
+    // Frames that were on their way are answered after a stop.
+    if (this.state !== "ended") this.message.take(answer.status);
   }
 
   /** Shows a frame that was tracked, and pauses.

@@ -4,6 +4,8 @@ import { GONE, isReadable } from "./problems.js";
 
 /** Media times that differ by less are the same frame's, in seconds. */
 export const SAME = 0.001;
+/** What is looked at before a frame lies so far before it, in seconds. */
+export const BEFORE = 0.002;
 /** How long a browser may take to show a frame that it went to, in milliseconds. */
 const SHOWN_WITHIN = 500;
 
@@ -96,9 +98,20 @@ const LEARNED_WITHIN = 2000;
 const USUAL = [10, 12, 15, 24000 / 1001, 24, 25, 30000 / 1001, 30, 48, 50, 60000 / 1001, 60, 120];
 const NEARLY = 0.004;
 
+/** The step from the frame before to this one; infinite where that is not told. A busy machine tells of no two frames that
+ * follow each other.
+ * @param {Playback} playback
+ * @param {number} time */
+async function stepTo(playback, time) {
+  const sought = time - BEFORE;
+  const before = await playback.reach(sought);
+  return isTimeOf(before, sought) && time - before.mediaTime > SAME ? time - before.mediaTime : Infinity;
+}
+
 /** Frames a second, from the first frames of a file.
- * @param {HTMLVideoElement} video */
-export async function learnRate(video) {
+ * @param {Playback} playback */
+export async function learnRate(playback) {
+  const { video } = playback;
   /** @type {number[]} */
   const times = [];
   video.playbackRate = 0.5;
@@ -116,9 +129,11 @@ export async function learnRate(video) {
     video.play().catch(resolve);
   });
   video.pause();
-  const steps = times.map((time, at) => time - (times[at - 1] ?? time)).filter((step) => step > SAME);
+  const later = times.filter((time, at) => time - (times[at - 1] ?? time) > SAME);
+  const steps = later.map((time) => time - times[times.indexOf(time) - 1]);
   if (steps.length === 0) return 30;
-  const shortest = Math.min(...steps);
+  const at = steps.indexOf(Math.min(...steps));
+  const shortest = Math.min(steps[at], await stepTo(playback, later[at]));
   const count = steps.reduce((sum, step) => sum + Math.round(step / shortest), 0);
   const rate = count / steps.reduce((sum, step) => sum + step, 0);
   const usual = USUAL.reduce((one, other) => (Math.abs(other - rate) < Math.abs(one - rate) ? other : one));

@@ -219,15 +219,18 @@ export class Run {
 
   /** The user drew a box in the picture that is shown: for an object, or for a new one.
    * @param {Box} box
-   * @param {FollowedObject | undefined} object */
-  draw(box, object) {
-    this.drawn = { box, object };
+   * @param {FollowedObject | undefined} object
+   * @param {() => void} refused Is told where the tracker does not take it. */
+  draw(box, object, refused) {
+    this.drawn = { box, object, refused };
     sendDrawn(this);
   }
 
   /** Tracks frames again while no other ones are tracked.
    * @param {() => Promise<void>} track */
   async alone(track) {
+    // One that goes on may wait for its file, while a box is followed.
+    while (this.isRedoing) await new Promise(requestAnimationFrame);
     this.isRedoing = true;
     this.throttle();
     try {

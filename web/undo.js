@@ -43,8 +43,13 @@ export class Undoing {
     // Where this fails, the step stays.
     if (object && step.rows) await bringBack(run, object, step);
     else if (object) run.remove(object);
-    this.steps = this.steps.filter((other) => other !== step);
+    this.drop(step);
     return object?.name;
+  }
+
+  /** @param {Step} step One that is undone, or was none after all. */
+  drop(step) {
+    this.steps = this.steps.filter((other) => other !== step);
   }
 }
 

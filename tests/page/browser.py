@@ -177,6 +177,23 @@ HELD = """(count) => {
 }"""
 
 
+HELD_FILE = """(count) => {
+    const own = HTMLCanvasElement.prototype.toBlob;
+    let given = 0;
+    const released = new Promise((resolve) => (window.releaseFile = resolve));
+    HTMLCanvasElement.prototype.toBlob = function (...what) {
+        if ((given += 1) > count) released.then(() => own.apply(this, what));
+        else own.apply(this, what);
+    };
+}"""
+
+
+def held_file(page, count):
+    """Lets a file give this many more frames; the next one waits for what this returns."""
+    page.evaluate(HELD_FILE, count)
+    return lambda: page.evaluate("window.releaseFile()")
+
+
 def held(page, count):
     """Lets the page read this many of the frames that it keeps; the next one waits for what this returns."""
     page.evaluate(HELD, count)

@@ -4,8 +4,8 @@ import json
 import os
 import statistics
 
-from browser import DRAW, distance, drag, drawn_frames, frames, kept_rows, rows, said, saved, say_nothing, slow, stop
-from browser import to_the_end, was_said
+from browser import DRAW, begin_at, distance, drag, drawn_frames, frames, held_file, kept_rows, rows, said, saved
+from browser import say_nothing, slow, stop, to_the_end, was_said
 from clips import DRAWN, FRAMES, H264, SIZE, VP8, frame_numbers, run
 from service import Line, Service
 
@@ -148,10 +148,13 @@ def whole_file(checks, path, rate):
 def spoiled(checks, page, path, spoil):
     """A file that is removed or changed after some frames is to be chosen again."""
     choose_file(page, path)
+    # Else the file may have ended, or all of it be read, before it is spoiled.
+    release = held_file(page, 20)
     drag(page, sent_box(checks.files.truth[0]))
     frames(page, 8)
     page.locator("#pause").click()
     spoil()
+    release()
     page.locator("#pause").click()
     said(page, f"The file cannot be read: it was moved, changed or removed. Choose {path.name} again.")
     assert page.locator("#resume").is_hidden()
@@ -407,8 +410,8 @@ BUSY = """() => {
 
 
 def played_on_a_busy_machine(checks):
-    """A file that is played gives each frame its number and its time where the browser passes frames over, from the
-    beginning on, and after it was chosen again."""
+    """A file that is played gives each frame its number and its time where the browser passes frames over: from the
+    beginning on, after the page was loaded anew, and from the middle on."""
     service = Service(checks.program, "--allowed-hosts", "machine.test")
     browser = checks.launch("--host-resolver-rules=MAP machine.test 127.0.0.1")
     allowed = ("Cross-Origin-Opener-Policy", "Failed to load")
@@ -429,6 +432,13 @@ def played_on_a_busy_machine(checks):
     stop(page)
     table = rows(page)
     check_rows(table, path, checks.files.truth, range(len(table)), [number / 30 for number in range(len(table))])
+    choose_file(page, path)
+    begin_at(page, 1, 30)
+    drag(page, sent_box(checks.files.truth[30]))
+    frames(page, 5)
+    stop(page)
+    told = [(int(row["frame"]), round(30 * float(row["time"]), 1)) for row in rows(page)]
+    assert told == [(number, number) for number in range(30, 30 + len(told))], told
     browser.close()
     service.stop()
 
