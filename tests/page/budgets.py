@@ -76,7 +76,7 @@ def share_of_a_core():
 
 
 def first_box_after_drawing(checks):
-    seconds = []
+    begun, seconds = asked(), []
     for _ in range(RUNS):
         page = checks.page(where="here")
         choose(page, "card")
@@ -84,7 +84,7 @@ def first_box_after_drawing(checks):
         drag(page, checks.clips["card"]["truth"][0])
         seconds.append(page.evaluate("window.firstBox") / 1000)
         page.context.close()
-    share, why = asked()
+    share, why = min(begun, asked())
     told = f"{min(seconds):.2f} s after drawing, at worst {max(seconds):.2f}"
     print(f"  the first tracked box {told} (promised: {MAX_SECONDS_TO_BOX}{why})")
     assert min(seconds) <= MAX_SECONDS_TO_BOX / share, seconds
@@ -92,7 +92,7 @@ def first_box_after_drawing(checks):
 
 def many_objects_in_the_page(checks):
     for count, wanted in RATES.items():
-        rates = []
+        begun, rates = asked(), []
         for _ in range(RUNS):
             page = checks.page(where="here")
             told = page.evaluate(TRACK, [count, 60])
@@ -101,7 +101,7 @@ def many_objects_in_the_page(checks):
             (x, y, w, h), box = told["truth"][:4], told["box"]
             off = abs(x + w / 2 - box["x"] - box["width"] / 2) + abs(y + h / 2 - box["y"] - box["height"] / 2)
             assert off < 15, told
-        share, why = asked()
+        share, why = min(begun, asked())
         print(f"  {count} objects of 640 x 480: {max(rates):.1f} frames a second (promised: {wanted}{why})")
         assert max(rates) >= share * wanted, rates
 

@@ -93,14 +93,14 @@ def weight_and_first_picture(checks):
     total = sum(size for _, size in sizes)
     print(f"  the page has {total} bytes in {len(sizes)} files")
     assert 10_000 < total <= MAX_BYTES, sizes
-    seconds = []
+    begun, seconds = budgets.asked(), []
     for _ in range(3):
         page.reload()
         started = time.monotonic()
         choose(page, "card")
         seconds.append(time.monotonic() - started)
     print(f"  the first picture after {min(seconds):.2f} s")
-    share, _ = budgets.asked()
+    share, _ = min(begun, budgets.asked())
     assert min(seconds) <= MAX_SECONDS_TO_PICTURE / share, seconds
 
 
@@ -195,6 +195,7 @@ def phone_by_touch(checks):
     look = lambda: page.locator("#draw").evaluate("button => getComputedStyle(button).backgroundColor")
     off = look()
     page.locator("#draw").tap()
+    page.locator("#draw[aria-pressed=true]").wait_for()
     assert look() != off, "one cannot see that it is on"
     page.locator("#picture").scroll_into_view_if_needed()
     (left, top), (right, bottom) = corners(page, truth[0])
@@ -489,8 +490,10 @@ def main():
             for check in ALL:
                 if not arguments.only or check.__name__ in arguments.only:
                     print(check.__name__, flush=True)
+                    begun = time.monotonic()
                     check(checks)
                     assert not checks.faults, checks.faults
+                    print(f"  ({time.monotonic() - begun:.0f} s)")
             checks.browser.close()
     finally:
         service.stop()

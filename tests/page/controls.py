@@ -126,6 +126,7 @@ def second_finger(checks):
     page = checks.page(where="here", **PHONE)
     choose(page, "card")
     page.locator("#draw").tap()
+    page.locator("#draw[aria-pressed=true]").wait_for()
     page.locator("#picture").scroll_into_view_if_needed()
     truth = checks.clips["card"]["truth"][0]
     (left, top), (right, bottom) = corners(page, truth)
@@ -183,6 +184,7 @@ def drag_that_does_not_end(checks):
     mouse("mouseMoved", right, bottom)
     shows(False)
     page.locator("#draw").tap()
+    page.locator("#draw[aria-pressed=true]").wait_for()
     page.locator("#picture").scroll_into_view_if_needed()
     (left, top), (right, bottom) = corners(page, truth)
     finger("touchStart", (right + 60, top - 20))

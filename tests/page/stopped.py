@@ -341,6 +341,8 @@ def played_again(checks):
     page.keyboard.press("Space")
     page.wait_for_function(PLAYS, arg=len(table) - 1)
     page.keyboard.press("Space")
+    # What was shown last is told with the next picture of the screen.
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
     paused = at()
     release()
     page.locator("#pause", has_text="Play").wait_for()
