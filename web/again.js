@@ -144,12 +144,14 @@ export async function catchUp(run, object, last = run.lastFrame) {
  * @param {Source} source That of the run, or another one of the same frames.
  */
 async function goOn(run, source) {
-  if (source !== run.source) {
-    run.passedOver += run.source.skipped;
-    run.source.close?.();
-    run.source = run.frames.source = source;
-  }
   await run.alone(async () => {
+    // It was stopped again, or left, while a box was followed.
+    if (run.wake || run.isOver) return source === run.source ? undefined : source.stop();
+    if (source !== run.source) {
+      run.passedOver += run.source.skipped;
+      run.source.close?.();
+      run.source = run.frames.source = source;
+    }
     [run.isResting, run.hasAll, run.failure] = [false, false, undefined];
     for (const object of run.objects) {
       object.follower.end();
@@ -170,8 +172,6 @@ export async function wake(run, open, own = run.wake) {
   run.wake = undefined;
   try {
     const source = await open();
-    // It was stopped again meanwhile.
-    if (run.wake || run.isOver) return source === run.source ? undefined : source.stop();
     await goOn(run, source);
   } catch (error) {
     // It can be tried again; where the run has failed meanwhile, with the source opened anew.

@@ -14,7 +14,7 @@ import { Problem } from "./js/problem.js";
  * @param {Run} run */
 export async function sendDrawn(run) {
   const { drawn, picture } = run;
-  if (!drawn || run.underWay.length > 0) return run.throttle();
+  if (!drawn || run.isRedoing || run.underWay.length > 0) return run.throttle();
   const { box, object } = drawn;
   const sent = { picture, at: performance.now() };
   run.underWay.push(sent);

@@ -80,12 +80,12 @@ export class Editing {
     this.page.stage.draw(undefined);
     const object = this.isAdding ? undefined : run.chosen;
     this.add(false);
+    run.pause(this.page.state === "paused");
     if (this.page.viewed || run.isResting) return void this.trackOn(run, object, (this.page.viewed ?? run.picture).frame, box);
     // Its session learns of the box.
     const step = { ...this.undoing.before(run, object), follower: undefined };
     this.undoing.push(step);
     run.draw(box, object, () => this.undoing.drop(step));
-    run.pause(this.page.state === "paused");
     this.page.say(object ? "The box is corrected." : "Following another object.");
   }
 
@@ -95,11 +95,12 @@ export class Editing {
    * @param {number} frame
    * @param {Box} box */
   trackOn(run, object, frame, box) {
-    const tell = (/** @type {number} */ done) => this.page.say(`Following anew: frame ${done} of ${run.lastFrame}.`);
+    const anew = object ? " anew" : "";
+    const tell = (/** @type {number} */ done) => this.page.say(`Following${anew}: frame ${done} of ${run.lastFrame}.`);
     return this.tracksAgain(run, object, async (signal) => {
       const { trackOn } = await again();
       const isWhole = await trackOn(run, object, frame, box, { tell, signal });
-      const from = `Followed ${object ? "anew " : ""}from frame ${frame}`;
+      const from = `Followed${anew} from frame ${frame}`;
       return isWhole ? `${from}.` : `${from}, by the box alone: the service had lost what was learned before.`;
     });
   }

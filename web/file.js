@@ -175,8 +175,10 @@ export class VideoFile {
     const image = drawFrame(this.video);
     // What looks the same may be the frame before, which is given away for longer than it is told of.
     const isSame = this.lastImage !== undefined && this.samePasses < SAME_PASSES && areEqual(image, this.lastImage);
-    this.samePasses = isSame ? this.samePasses + 1 : 0;
-    if (isSame) return this.retake();
+    if (isSame) {
+      this.samePasses += 1;
+      return this.retake();
+    }
     this.take(image, time, shown, true);
     this.adjust();
   }
@@ -213,6 +215,7 @@ export class VideoFile {
   take(image, time, shown, isDoubted = false) {
     const frame = this.last.frame + 1;
     this.interval = Math.min(this.interval, time - this.last.time);
+    this.samePasses = 0;
     this.last = { frame, time, shown };
     this.lastImage = image;
     this.delivery.add({ image, time, frame }, isDoubted);

@@ -10,7 +10,7 @@ const SLOWEST = 0.25;
 const MOST_PASSES = 6;
 /** A gap that cannot be looked into, and is the same at so many passes, belongs to the file. */
 export const SAME_PASSES = 2;
-/** Most frames that are gone to. */
+/** Most frames of a gap that are taken at a time. */
 const MOST_BETWEEN = 12;
 /** Some browsers go to the next key frame where it is near: then the way back begins so many seconds earlier. */
 const LEADS = [0, 0.5, 1.5, 5];
@@ -56,6 +56,8 @@ export class Gaps {
     if (found !== undefined && (isNext || (gap.passes > 1 && gap.passes < MOST_PASSES))) {
       // Where there is room for one frame only, there is no other one.
       const frames = await this.goBack({ image: drawFrame(video), time: found }, isNext);
+      if (this.file.isStopped) return;
+      if (frames.length === 0) return this.resume();
       if (this.file.delivery.isAhead(frames[0].image)) return this.file.retake();
       for (const { image, time } of frames) this.file.take(image, time, undefined);
       return frames.length === 1 && isNext ? this.goOnFrom(shown) : this.resume();
@@ -88,18 +90,21 @@ export class Gaps {
   }
 
   /**
-   * Goes from a frame to those before it, down to the one that was taken last.
+   * Goes from a frame to those before it, down to the one that was taken last. What lies after the first of them is
+   * looked for again; all, where the browser does not tell what it shows.
    * @param {{image: HTMLCanvasElement, time: number}} frame
    * @param {boolean} isNext Whether there is none before it.
    */
   async goBack(frame, isNext) {
     const frames = [frame];
-    while (!isNext && frames.length < MOST_BETWEEN) {
-      const { time } = frames[0];
-      const sought = time - BEFORE;
-      const before = this.between(await this.file.playback.seek(sought), sought);
-      if (before === undefined || this.file.isStopped) break;
+    while (!isNext) {
+      const sought = frames[0].time - BEFORE;
+      const shown = await this.file.playback.seek(sought);
+      if (this.file.isStopped || !isTimeOf(shown, sought)) return [];
+      const before = this.between(shown, sought);
+      if (before === undefined) break;
       frames.unshift({ image: drawFrame(this.file.video), time: before });
+      if (frames.length > MOST_BETWEEN) frames.pop();
     }
     return frames;
   }

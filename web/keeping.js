@@ -73,9 +73,10 @@ export class Keeping {
       // In one step: a page that is left ends it, and begins no other.
       const work = { id, at: Date.now(), isLocal, project, states: statesOf(run), clip, imageNames };
       const hasRoom = await keepWork(work, files);
+      if (forgotten !== this.forgotten) return forget(id).then(() => false);
       const hasFiles = files ? hasRoom && files.length > 0 : this.hasFiles;
       const isWhole = !!clip || hasFiles || source.isAbsent === true || run.isGone;
-      if (run !== this.page.run || forgotten !== this.forgotten) return isWhole;
+      if (run !== this.page.run) return isWhole;
       this.hasFiles = hasFiles;
       [this.source, this.store] = [source, store];
       this.isSafe = this.timer === undefined && isWhole;

@@ -229,7 +229,7 @@ export class Run {
   /** Tracks frames again while no other ones are tracked.
    * @param {() => Promise<void>} track */
   async alone(track) {
-    // One that goes on may wait for its file, while a box is followed.
+    // One may go on while a box is still followed that was drawn before.
     while (this.isRedoing) await new Promise(requestAnimationFrame);
     this.isRedoing = true;
     this.throttle();
@@ -239,7 +239,8 @@ export class Run {
     } finally {
       this.isRedoing = false;
       this.leaveSessions();
-      this.throttle();
+      if (this.isResting) this.throttle();
+      else sendDrawn(this);
       this.checkEnd();
     }
   }

@@ -47,7 +47,7 @@ export class Undoing {
     return object?.name;
   }
 
-  /** @param {Step} step One that is undone, or was none after all. */
+  /** @param {Step} step One that is undone, or whose box was refused. */
   drop(step) {
     this.steps = this.steps.filter((other) => other !== step);
   }

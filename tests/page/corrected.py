@@ -357,7 +357,8 @@ def box_at_the_edge(checks):
 
 
 def refused_box(checks):
-    """A box that the service does not take, in an earlier frame and for a new object: nothing changes, and it goes on."""
+    """A box that the service does not take, in an earlier frame and for a new object: nothing changes, and it goes on. One
+    that is refused late takes back no other change."""
     page = checks.page(allowed=("422",))
     choose(page, "card")
     drag(page, checks.clips["card"]["truth"][0])
@@ -377,6 +378,19 @@ def refused_box(checks):
     said(page, "This box cannot be followed")
     assert whole(rows(page)) == whole(before) and page.locator("#undo").is_disabled()
     page.unroute(opening)
+    asked = []
+    page.route(opening, lambda route: asked.append(route))
+    say_nothing(page)
+    to_frame(page, len(before) - 1)
+    page.locator("#add").click()
+    with page.expect_request(opening):
+        drag(page, OFF)
+    page.get_by_role("button", name="Delete Object 1").click()
+    asked[0].fulfill(status=422, content_type="application/problem+json", body=problem)
+    said(page, "This box cannot be followed")
+    page.unroute(opening)
+    page.locator("#undo").click()
+    said(page, "Object 1 is undone")
     page.locator("#pause").click()
     to_the_end(page)
     assert values(rows(page)[: len(before)]) == values(before)

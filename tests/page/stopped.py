@@ -6,8 +6,10 @@ import re
 from browser import (
     choose,
     drag,
+    drawn_frames,
     frames,
     held,
+    held_file,
     kept_rows,
     near,
     numbers,
@@ -132,6 +134,35 @@ def gone_on_after_a_stop(checks):
         if name != "card":
             check_distance(pathlib.Path("clip.mp4"), table, checks.files.truth)
         assert page.locator("#resume").is_hidden()
+        page.context.close()
+
+
+def drawn_as_it_goes_on(checks):
+    """A box that is drawn while the file of a stopped run is opened again is followed first. Then the run goes on."""
+    for where in ("here", "there"):
+        page = checks.page(where=where)
+        slow(page)
+        choose_file(page, checks.files.file("clip.mp4", 30, H264))
+        drag(page, sent_box(checks.files.truth[0]))
+        frames(page, 40)
+        page.locator("#stop").click()
+        said(page, "or go on")
+        before = kept_rows(page)
+        last = len(before) - 1
+        file, picture = held_file(page, 0), held(page, 0)
+        page.locator("#resume").click()
+        drag(page, sent_box(checks.files.truth[last]))
+        page.locator("#cancel").wait_for()
+        file()
+        # It would be open now, and go on beside.
+        page.wait_for_timeout(1000)
+        picture()
+        to_the_end(page)
+        table = rows(page)
+        assert [int(row["frame"]) for row in table] == list(range(FRAMES)), where
+        assert drawn_frames(page) == [0, last], where
+        assert values(table[:last]) == values(before[:last]), where
+        check_distance(pathlib.Path("clip.mp4"), table, checks.files.truth)
         page.context.close()
 
 
@@ -363,6 +394,7 @@ ALL = [
     service_with_other_keys,
     asked_for_a_key_later,
     gone_on_after_a_stop,
+    drawn_as_it_goes_on,
     stopped_after_a_reload,
     failed_after_it_was_left,
     no_session_is_left,
