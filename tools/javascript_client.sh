@@ -13,7 +13,7 @@ if ! command -v node >/dev/null || [ "$(node -p 'parseInt(process.versions.node)
     echo "Left out, for want of Node.js from 20 on: the tests of clients/js"
     exit 0
 fi
-(cd clients/js && node --experimental-websocket --test --test-timeout=120000 test/*.test.js)
+(cd clients/js && node --experimental-websocket --test --test-timeout=600000 test/*.test.js)
 
 if command -v npm >/dev/null && npm install --silent --no-audit --no-fund --prefix "$tools" "typescript@$typescript"; then
     rm -rf "$tools/types"
