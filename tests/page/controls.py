@@ -80,7 +80,7 @@ def focus_in_the_list(checks):
     release = held(page, 5)
     page.locator("#add").click()
     drag(page, [30, 200, 80, 60])
-    said(page, "Following anew: frame 1")
+    said(page, "Following: frame 1")
     page.keyboard.press("Shift")
     page.locator("#list button.remove").focus()
     assert page.locator("#list button.remove:focus-visible").count() == 1
