@@ -129,11 +129,11 @@ export async function learnRate(playback) {
     video.play().catch(resolve);
   });
   video.pause();
-  const later = times.filter((time, at) => time - (times[at - 1] ?? time) > SAME);
-  const steps = later.map((time) => time - times[times.indexOf(time) - 1]);
+  const told = times.filter((time, at) => at === 0 || time - times[at - 1] > SAME);
+  const steps = told.slice(1).map((time, at) => time - told[at]);
   if (steps.length === 0) return 30;
   const at = steps.indexOf(Math.min(...steps));
-  const shortest = Math.min(steps[at], await stepTo(playback, later[at]));
+  const shortest = Math.min(steps[at], await stepTo(playback, told[at + 1]));
   const count = steps.reduce((sum, step) => sum + Math.round(step / shortest), 0);
   const rate = count / steps.reduce((sum, step) => sum + step, 0);
   const usual = USUAL.reduce((one, other) => (Math.abs(other - rate) < Math.abs(one - rate) ? other : one));

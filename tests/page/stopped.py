@@ -141,12 +141,14 @@ def drawn_as_it_goes_on(checks):
     """A box that is drawn while the file of a stopped run is opened again is followed first. Then the run goes on."""
     for where in ("here", "there"):
         page = checks.page(where=where)
-        slow(page)
         choose_file(page, checks.files.file("clip.mp4", 30, H264))
+        # It waits there: it cannot have ended when it is stopped.
+        rest = held_file(page, FRAMES // 2)
         drag(page, sent_box(checks.files.truth[0]))
-        frames(page, 40)
+        frames(page, 20)
         page.locator("#stop").click()
         said(page, "or go on")
+        rest()
         before = kept_rows(page)
         last = len(before) - 1
         file, picture = held_file(page, 0), held(page, 0)
