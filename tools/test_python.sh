@@ -42,7 +42,6 @@ for packages in "got10k==0.1.3" "vot-toolkit==0.9.0 vot-trax>=4 attributee==0.1.
     environment_with "$environment" $packages || echo "Left out, for want of its package: $packages"
 done
 
-cargo clippy --locked -p bagtrack-python -- -D warnings
 rm -rf target/wheels
 "$environment/bin/maturin" build --quiet --release --locked --manifest-path python/Cargo.toml --out target/wheels
 "$environment/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps target/wheels/*.whl
