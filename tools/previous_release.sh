@@ -20,12 +20,21 @@ if ! commit=$(git rev-parse --quiet --verify "$commit^{commit}"); then
 fi
 
 build=${CARGO_TARGET_DIR:-$PWD/target}
+
+# The tables of a Cargo.toml that are profiles (1), or all others (0).
+tables() {
+    awk -v profiles="$1" '/^\[/ {is_profile = /^\[profile\./} is_profile == profiles' "$2"
+}
+
 # Cargo takes older files for built ones, so two commits have no folder in common.
 folder=$PWD/target/previous/$commit
 if [ ! -d "$folder/source" ]; then
     rm -rf "$folder"
     mkdir -p "$folder/part"
     git archive "$commit" | tar --extract --directory "$folder/part"
+    # With the profiles of this commit, so that what is built of the registry is the same.
+    { tables 0 "$folder/part/Cargo.toml"; tables 1 Cargo.toml; } >"$folder/Cargo.toml"
+    mv "$folder/Cargo.toml" "$folder/part/Cargo.toml"
     (
         cd "$folder/part"
         sed -i '/^\[workspace.package\]/,/^$/s/^version = "\(.*\)"/version = "\1+previous"/' Cargo.toml
