@@ -193,10 +193,13 @@ export class Page {
       await own.begin(box);
       if (own !== this.run) return;
       this.stage.draw(undefined);
-      if (this.state !== "ended") this.say(FOLLOWING);
+      if (this.state === "ended") return;
+      this.say(FOLLOWING);
+      // It was stopped, and is to go on.
+      if (own.wake) await this.player.goOn();
     } catch (error) {
       if (own !== this.run) return;
-      this.enter("first");
+      this.enter(own.isResting && !own.wake ? "ended" : "first");
       this.fail(error, () => this.follow(own, box));
       // It waits for a key.
       if (get("key-form").hidden) this.stage.draw(undefined);

@@ -36,11 +36,13 @@ export class Player {
     const { page } = this;
     const { run, state } = page;
     if (!run || run.isRedoing || run.isOver) return;
-    if (run.wantsObject) return page.say(run.count > 0 ? `There is no object. ${TAP}${DRAW}` : BEGINNING);
+    if (run.wantsObject && run.count > 0) return page.say(`There is no object. ${TAP}${DRAW}`);
     const isStopped = run.wake && state === "ended";
     page.enter("following");
-    if (isStopped) page.say(FOLLOWING);
+    if (isStopped) page.say(run.wantsObject ? BEGINNING : FOLLOWING);
     page.pause(false);
+    // It goes on once its first box is followed.
+    if (run.wantsObject) return;
     try {
       await run.wake?.();
     } catch (error) {

@@ -257,6 +257,34 @@ def no_session_is_left(checks):
     service.stop()
 
 
+def stopped_before_the_first_box(checks):
+    """A run is stopped while its first box is on its way: it goes on once that is followed, or another one is drawn."""
+    refused = {"status": 422, "content_type": "application/problem+json", "body": '{"status": 422}'}
+    for answer in ({}, refused):
+        page = checks.page(allowed=("422",))
+        truth = checks.clips["card"]["truth"]
+        held = []
+        opening = "**/sessions/*?*box=*"
+        page.route(opening, lambda route: route.continue_() if held else held.append(route))
+        choose(page, "card")
+        with page.expect_request(opening):
+            drag(page, truth[0])
+        page.locator("#stop").click()
+        said(page, "or go on")
+        if not answer:
+            page.locator("#resume").click()
+            said(page, "Beginning")
+        if answer:
+            held[0].fulfill(**answer)
+            page.locator("#message.bad").wait_for()
+            drag(page, truth[0])
+        else:
+            held[0].continue_()
+        to_the_end(page)
+        assert len(rows(page)) == len(truth), len(rows(page))
+        page.context.close()
+
+
 def offline(checks):
     """A machine that has lost its network is told of it at once, and goes on when it has one again. The socket tells
     nothing for a minute."""
@@ -400,6 +428,7 @@ ALL = [
     stopped_after_a_reload,
     failed_after_it_was_left,
     no_session_is_left,
+    stopped_before_the_first_box,
     offline,
     sample_broken_off,
     worker_ended,
