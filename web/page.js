@@ -196,7 +196,7 @@ export class Page {
       if (this.state === "ended") return;
       this.say(FOLLOWING);
       // It was stopped, and is to go on.
-      if (own.wake) await this.player.goOn();
+      if (own.wake && this.state === "following") await this.player.goOn();
     } catch (error) {
       if (own !== this.run) return;
       this.enter(own.isResting && !own.wake ? "ended" : "first");
