@@ -264,6 +264,16 @@ impl From<FramesError> for Problem {
     }
 }
 
+impl Problem {
+    /// The client has so many sessions as it may.
+    fn no_more_sessions(most: &str) -> Self {
+        let detail = format!(
+            "One client may have {most}. Delete sessions that are done, or try again after the time in `Retry-After`."
+        );
+        Self::new(Kind::QuotaExceeded, detail).with_effect(Effect::NothingChanged)
+    }
+}
+
 impl From<OpenError> for Problem {
     fn from(error: OpenError) -> Self {
         match error {
@@ -281,17 +291,13 @@ impl From<OpenError> for Problem {
             },
             OpenError::Snapshot(error) => error.into(),
             OpenError::Draining => Self::not_ready(),
-            OpenError::Quota(error) => error.into(),
-            OpenError::StoreShare(share) => Self::new(
-                Kind::QuotaExceeded,
-                format!(
-                    "One client may have {} sessions in the store here, and {} bytes of them (a quarter of \
-                     `--max-session-bytes`). Delete sessions that are done, or try again after the time in \
-                     `Retry-After`.",
-                    share.max_places, share.max_bytes
-                ),
-            )
-            .with_effect(Effect::NothingChanged),
+            OpenError::Quota(QuotaExhausted { what, limit }) => {
+                Self::no_more_sessions(&format!("{limit} {what} here"))
+            }
+            OpenError::StoreShare(share) => Self::no_more_sessions(&format!(
+                "{} sessions in the store here, and {} bytes of them (a quarter of `--max-session-bytes`)",
+                share.max_places, share.max_bytes
+            )),
             OpenError::TooManyTargets { count, limit } => Self::invalid_parameter(format!(
                 "Each target counts as a session, and one client may have {limit} here (`--client-sessions`): \
                  of {count} targets follow at most {limit}."

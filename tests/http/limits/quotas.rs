@@ -30,7 +30,8 @@ async fn one_client_cannot_take_all_sessions() {
     let refused = app.create_as("198.51.100.1").await;
     let policy = refused.headers()["ratelimit-policy"].to_str().unwrap();
     assert!(policy.contains("\"sessions\";q=2"), "{policy}");
-    expect_detail(refused, "quota-exceeded", &["2 sessions"]).await;
+    let parts = ["2 sessions", "Delete sessions that are done"];
+    expect_detail(refused, "quota-exceeded", &parts).await;
     expect(app.create_as("198.51.100.2").await, StatusCode::CREATED).await;
     let deleted = app
         .request(Method::DELETE, &paths[0], &[])
@@ -87,6 +88,8 @@ async fn a_client_with_one_session_gets_its_turn_beside_one_with_forty() {
     let app = TestApplication::start_with(|config| {
         behind_a_proxy(config);
         config.workers = Some(1);
+        // A client has a quarter of it: forty such sessions.
+        config.limits.max_session_bytes = Some(1 << 30);
     });
     let app = app.await;
     let mut greedy = JoinSet::new();

@@ -22,17 +22,17 @@ fn frame(clip: &Clip, index: u32) -> Frame {
     Frame::from_luma(picture.width(), picture.height(), luma).expect("a whole picture")
 }
 
-fn follow(clip: &Clip, seed: u64) -> Vec<Estimate> {
+/// The answers to all frames but the first.
+fn follow(clip: &Clip, frames: &[Frame], seed: u64) -> Vec<Estimate> {
     let params = bagtrack_tracker::Params {
         seed,
         ..Preset::default().params()
     };
-    let mut tracker = Tracker::new(&frame(clip, 0), clip.target(0), params).expect("a box inside");
-    let further = (1..clip.frames()).map(|index| {
-        let answer = tracker.step(&frame(clip, index));
-        answer.expect("frames of one size")
-    });
-    further.collect()
+    let mut tracker = Tracker::new(&frames[0], clip.target(0), params).expect("a box inside");
+    let further = frames[1..].iter().map(|frame| tracker.step(frame));
+    further
+        .map(|answer| answer.expect("frames of one size"))
+        .collect()
 }
 
 #[test]
@@ -51,9 +51,13 @@ fn is_lost_and_found_again(scene: Scene) {
         ..Settings::default()
     })
     .expect("the settings are in order");
+    // To draw them takes longer than to track.
+    let frames: Vec<_> = (0..clip.frames())
+        .map(|index| frame(&clip, index))
+        .collect();
     for seed in 0..6 {
         let (mut hidden, mut lost) = (0, 0);
-        for answer in follow(&clip, seed) {
+        for answer in follow(&clip, &frames, seed) {
             let index = u32::try_from(answer.frame).expect("a short clip");
             let overlap = clip.target(index).overlap(&answer.target);
             let status = answer.status;
