@@ -30,12 +30,13 @@ def reloaded_in_the_middle(checks):
     """The tab is loaded anew while a file is tracked: rows, names and the file are there, and it goes on to the end."""
     path = checks.files.file("clip.mp4", 30, H264)
     page = checks.page(where="here")
-    slow(page)
+    hurry = slow(page)
     choose_file(page, path)
     drag(page, sent_box(checks.files.truth[0]))
     page.locator("#list input[type=text]").fill("The card")
     frames(page, 40)
     page.locator("#pause").click()
+    hurry()
     before = kept_rows(page)
     kept_says(page, "clip.mp4, 1 object, ")
     page.reload()
@@ -146,11 +147,12 @@ def left_for_another_source(checks):
     text = checks.files.folder / "notes.txt"
     text.write_text("no video")
     page = checks.page(where="here")
-    slow(page)
+    hurry = slow(page)
     choose_file(page, path)
     drag(page, sent_box(checks.files.truth[0]))
     frames(page, 20)
     page.locator("#pause").click()
+    hurry()
     before = kept_rows(page)
     page.locator("#file").set_input_files(text)
     page.locator("#message.bad").wait_for()
@@ -278,11 +280,12 @@ def half_tracked_project(checks):
     Another video is refused along with it, and opened for itself afterwards."""
     path = checks.files.file("clip.mp4", 30, H264)
     page = checks.page(where="here")
-    slow(page)
+    hurry = slow(page)
     choose_file(page, path)
     drag(page, sent_box(checks.files.truth[0]))
     frames(page, 20)
     page.locator("#pause").click()
+    hurry()
     project = saved_project(checks, page, "half")
 
     renamed = checks.files.folder / "clip (1).mp4"

@@ -113,15 +113,15 @@ def gone_on_after_a_stop(checks):
             choose(page, "card")
             drag(page, checks.clips["card"]["truth"][0])
         else:
-            hurry = slow(page)
+            rest = held_file(page, FRAMES // 2)
             choose_file(page, checks.files.file("clip.mp4", 30, H264))
             drag(page, sent_box(checks.files.truth[0]))
-        frames(page, 40)
+        frames(page, 30)
         page.locator("#stop").click()
         said(page, "or go on")
-        before = kept_rows(page)
         if name != "card":
-            hurry()
+            rest()
+        before = kept_rows(page)
         if name == "again":
             page.reload()
             said(page, "clip.mp4 is here again")
@@ -171,12 +171,13 @@ def drawn_as_it_goes_on(checks):
 def stopped_after_a_reload(checks):
     """A run that is stopped after the page was loaded anew goes on all the same."""
     page = checks.page(where="here")
-    slow(page)
+    hurry = slow(page)
     choose_file(page, checks.files.file("clip.mp4", 30, H264))
     drag(page, sent_box(checks.files.truth[0]))
     frames(page, 20)
     page.locator("#pause").click()
     kept_rows(page)
+    hurry()
     page.reload()
     said(page, "clip.mp4 is here again")
     page.locator("#stop").click()
