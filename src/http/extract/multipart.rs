@@ -130,6 +130,7 @@ pub(super) async fn read<S: Settings>(
             }
             fields.texts.add(&name, &String::from_utf8_lossy(&text))?;
         } else if fields.files.len() < max_files {
+            fields.media_type = part.content_type().map(str::to_lowercase);
             let file = read_part(part, &progress, max_bytes, max_bytes, charge).await?;
             fields.files.push(file);
         } else {

@@ -53,7 +53,7 @@ impl Texts {
         match self.0.insert(name.to_owned(), text.into()) {
             None => Ok(()),
             Some(_) => Err(Problem::malformed(format!(
-                "`{name}` is given twice; give it once."
+                "`{name}` is given twice; give it once (a box is `x,y,width,height` in one)."
             ))),
         }
     }
@@ -87,6 +87,8 @@ impl Texts {
 #[derive(Debug, Default)]
 pub(super) struct Fields {
     pub(super) files: Vec<Bytes>,
+    /// That of a file, where a form tells it.
+    pub(super) media_type: Option<String>,
     pub(super) snapshot: Option<Bytes>,
     pub(super) texts: Texts,
 }

@@ -88,10 +88,12 @@ impl<S: Settings> Upload<S> {
         let Fields {
             files,
             snapshot,
+            media_type: of_file,
             texts: of_body,
         } = fields;
         check_files::<S>(&files, max_files)?;
-        let formats = files.iter().map(|file| video_format(file, &media_type));
+        let of_file = of_file.as_deref().unwrap_or(&media_type);
+        let formats = files.iter().map(|file| video_format(file, of_file));
         let video = formats.flatten().next();
         if video.is_some() && (!S::TAKES_VIDEO || files.len() > 1) {
             return Err(Problem::new(Kind::UnsupportedImage, VIDEO));

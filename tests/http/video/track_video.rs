@@ -124,6 +124,18 @@ async fn what_is_wrong_with_the_video_or_the_box_is_told() {
     expect_problem(refused.unwrap(), "malformed-request").await;
 }
 
+/// All but its first picture was left out.
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn motion_jpeg_in_a_form_has_its_type_at_its_part() {
+    let app = TestApplication::start().await;
+    let part = Part::bytes(motion_jpeg()).mime_str("video/x-motion-jpeg");
+    let request = app.request(Method::POST, "/track", &[("box", FIRST)]);
+    let form = Form::new().part("frame", part.unwrap());
+    let answer = request.multipart(form).send().await.unwrap();
+    assert_eq!(lines(answer).await.len(), FRAMES as usize);
+}
+
 /// Frames before the start counted as those that are tracked, so that the end of a long video was out of reach.
 #[tokio::test]
 #[ignore = "needs ffmpeg"]

@@ -13,7 +13,7 @@ use bagtrack_sessions::KEPT_ANSWERS;
 use bagtrack_testing::within::within;
 use futures_util::future::join_all;
 use image::ImageFormat;
-use reqwest::{Method, Response};
+use reqwest::{Method, Response, StatusCode};
 use std::process::Command;
 use std::time::Duration;
 
@@ -471,4 +471,38 @@ async fn damage_in_the_middle_of_a_video_is_told_and_nothing_after_it_is_numbere
         .iter_mut()
         .for_each(|byte| *byte ^= 0x5A);
     assert!(until_damage(&app, noise).await < FRAMES as usize);
+}
+
+/// The frames of a video up to its damage, which the last line must name.
+async fn frames_before_damage(app: &TestApplication, video: &[u8]) -> usize {
+    let request = app.request(Method::POST, "/track", &[("box", "20,20,60,60")]);
+    let answer = request.body(video.to_vec()).send().await.unwrap();
+    assert_eq!(answer.status(), StatusCode::OK);
+    let mut got = lines(answer).await;
+    let last = got.pop().expect("a line");
+    assert_eq!(last["type"], "/docs/problems#frame-damaged", "{last}");
+    got.len()
+}
+
+/// ffmpeg looks seconds ahead for the kind of the sound, and told the damage before the first picture: there was no row.
+/// Without sound the damage was told some pictures early, at another one each time.
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn damage_is_told_at_its_picture_with_sound_and_without() {
+    let app = TestApplication::start().await;
+    let pictures = "testsrc2=size=320x240:rate=30";
+    let coded = "-frames:v 90 -c:v libx264 -g 30 -pix_fmt yuv420p";
+    let silent = made("silent.mp4", &format!("{pictures} {coded}"));
+    let sound = "-f lavfi -i sine -c:a aac -shortest";
+    let loud = made("loud.mp4", &format!("{pictures} {sound} {coded}"));
+    for whole in [silent, loud] {
+        let mut damaged = whole.clone();
+        let middle = whole.len() / 2;
+        damaged[middle..middle + 500].fill(0x5A);
+        let frames = frames_before_damage(&app, &damaged).await;
+        assert!((30..60).contains(&frames), "{frames}");
+        for _ in 0..3 {
+            assert_eq!(frames_before_damage(&app, &damaged).await, frames);
+        }
+    }
 }

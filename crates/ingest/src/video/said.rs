@@ -34,12 +34,14 @@ pub(super) struct Said(Arc<(Mutex<Heard>, Condvar)>);
 
 #[derive(Debug, Default)]
 struct Heard {
-    /// Whether a picture that others are made from may be missing.
-    takes_missing_references: bool,
+    /// Whether the program leaves out what it cannot make, in place of ending there.
+    leaves_out: bool,
     /// The first one that tells more than that something failed.
     fault: Option<Fault>,
     /// One that holds for the end of the video alone.
     fault_at_end: Option<Fault>,
+    /// Whether that is the damage at which the program is about to end.
+    is_damaged: bool,
     /// Whether the last line was of a codec that may not be read.
     is_unlisted: bool,
     /// Whether the mark was heard, or the program says nothing more.
@@ -47,10 +49,10 @@ struct Heard {
 }
 
 impl Said {
-    /// Nothing yet. A picture that others are made from is told as missing, or not.
-    pub(super) fn new(takes_missing_references: bool) -> Self {
+    /// Nothing yet. The program leaves out pictures that it cannot make for want of others, or ends there.
+    pub(super) fn new(leaves_out: bool) -> Self {
         let heard = Heard {
-            takes_missing_references,
+            leaves_out,
             ..Heard::default()
         };
         Self(Arc::new((Mutex::new(heard), Condvar::new())))
@@ -98,7 +100,7 @@ impl Said {
     /// What the program says of damage.
     #[cfg(fuzzing)]
     pub(super) fn damage(&self) -> Option<String> {
-        match self.fault() {
+        match self.fault_in_all() {
             Some(Fault::Damage(text)) => Some(text),
             _ => None,
         }
@@ -153,16 +155,29 @@ impl Heard {
             self.is_unlisted = true;
             return;
         }
-        if self.takes_missing_references && is_reference(line) {
+        if self.leaves_out && is_reference(line) {
             return;
         }
-        match &self.fault {
-            None => self.fault = Some(fault(line, was_unlisted)),
+        match (&self.fault, fault(line, was_unlisted)) {
             // Memory may be told after what fails for want of it.
-            Some(Fault::Damage(_)) if is_memory(line) => self.fault = Some(Fault::Memory),
-            Some(_) => {}
+            (Some(Fault::Damage(_)), _) if is_memory(line) => self.fault = Some(Fault::Memory),
+            (Some(_), _) => {}
+            // It follows from the damage.
+            (None, _) if self.is_damaged && !is_memory(line) => {}
+            // It is looked for ahead of the pictures. Those that are there have their numbers.
+            (None, found @ Fault::Damage(_)) if !self.leaves_out && !goes_on_after(line) => {
+                self.fault_at_end = Some(found);
+                self.is_damaged = true;
+            }
+            (None, found) => self.fault = Some(found),
         }
     }
+}
+
+/// Whether the program may go on after such a line, though it is to end at all damage: readers that look for the next
+/// piece that is whole.
+fn goes_on_after(line: &str) -> bool {
+    line.starts_with("[matroska") || line.starts_with("[gif")
 }
 
 /// Whether a line is of a codec of sound, which is looked at to know what it is, and not decoded.
@@ -219,7 +234,11 @@ fn fault(line: &str, was_unlisted: bool) -> Fault {
     } else if is_memory(line) || says("get_buffer() failed") {
         // Without a line before it that says what is wrong with the picture.
         Fault::Memory
-    } else if was_unlisted && says("while opening decoder") {
+    } else if was_unlisted && says("while opening decoder")
+        // Of a codec that the program does not know at all, in its words of before 6.1 and since.
+        || says("not found for input stream")
+        || says("no decoder found for")
+    {
         Fault::UnreadCodec
     } else if is_reference(line) {
         Fault::Reference
@@ -244,7 +263,8 @@ mod tests {
         let endless = BufReader::new(io::repeat(b'x').take(64 << 20));
         let used = allocation_counter::measure(|| said.hear(endless));
         assert!(used.bytes_max < 64 << 10, "{used:?}");
-        assert_eq!(said.fault(), Some(Fault::Damage("x".repeat(MAX_SAID))));
+        let told = Some(Fault::Damage("x".repeat(MAX_SAID)));
+        assert_eq!(said.fault_in_all(), told);
     }
 
     /// On a busy machine a first picture was there before what had been said of the pictures before it.
@@ -279,7 +299,7 @@ mod tests {
         let fault = |lines: &[&str]| {
             let said = Said::default();
             said.hear(lines.join("\n").as_bytes());
-            said.fault()
+            said.fault_in_all()
         };
         let unlisted = "[prores @ 0x1] Codec (prores) not on whitelist 'h264'";
         let damage = |text: &str| Some(Fault::Damage(text.to_owned()));
@@ -318,10 +338,34 @@ mod tests {
         assert_eq!(fault(&encoded), Some(Fault::Memory));
         let failed = "Error while opening decoder for input stream #0:0 : Invalid argument";
         assert_eq!(fault(&[unlisted, failed]), Some(Fault::UnreadCodec));
+        let unknown = "Decoder (codec none) not found for input stream #0:0";
+        assert_eq!(fault(&[unknown]), Some(Fault::UnreadCodec));
         // The sound's codec may not be read either, and says nothing of the pictures.
         assert_eq!(
             fault(&[unlisted, "[h264 @ 0x1] no extradata", failed]),
             damage("no extradata")
         );
+    }
+
+    /// What is found ahead of the pictures counts where the program ends, if it does.
+    #[test]
+    fn damage_counts_at_the_end_where_the_program_ends_at_it() {
+        let nal = "[h264 @ 0x1] Invalid NAL unit size (9 > 5).";
+        let reference = "[h264 @ 0x1] no frame!";
+        let mkv = "[matroska,webm @ 0x1] 0x00 at pos 9 invalid as first byte of an EBML number";
+        let gif = "[gif @ 0x1] LZW decode failed";
+        for (lines, leaves_out, is_at_once) in [
+            (vec![nal], false, false),
+            (vec![nal, reference], false, false),
+            (vec![nal], true, true),
+            (vec![mkv], false, true),
+            (vec![gif], false, true),
+            (vec![reference, nal], false, true),
+        ] {
+            let said = Said::new(leaves_out);
+            said.hear(lines.join("\n").as_bytes());
+            assert_eq!(said.fault().is_some(), is_at_once, "{lines:?}");
+            assert!(said.fault_in_all().is_some(), "{lines:?}");
+        }
     }
 }
