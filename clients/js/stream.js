@@ -102,6 +102,8 @@ export class FrameStream {
     /** @type {{origin: import("./kept.js").Origin, until: number} | undefined} A snapshot of a frame up to `until`. */
     this.newer = undefined;
     this.isRenewing = false;
+    /** @type {Error | undefined} What a frame is told that comes too late. */
+    this.whyEnded = undefined;
     /** @type {(problem: Error | undefined) => void} */
     this.resolveEnded = () => undefined;
     /** @type {Promise<Error | undefined>} The stream has ended: why, if it was not by `close`. */
@@ -125,7 +127,7 @@ export class FrameStream {
    * @returns {Promise<StreamAnswer | undefined>} Nothing where the frame was skipped, in a live stream.
    */
   track(frame, { box, see } = {}) {
-    if (this.isEnded) return Promise.reject(new Error("The stream has ended."));
+    if (this.isEnded) return Promise.reject(this.whyEnded);
     return new Promise((resolve, reject) => {
       const own = frameOf(frame);
       const header = { box: box == null ? undefined : boxOf(box), see };
@@ -461,7 +463,8 @@ export class FrameStream {
     const { kept, frame: last } = this.session;
     const sent = this.outOfOrder ? [] : left.slice(0, this.sent);
     sent.forEach((it, index) => kept.put({ number: last + 1 + index, frame: sentFrame(it), box: it.header.box }));
-    left.forEach(({ reject }) => reject(problem ?? new Error("The stream has ended.")));
+    this.whyEnded = problem ?? new Error("The stream has ended.");
+    left.forEach(({ reject }) => reject(this.whyEnded));
     this.resolveEnded(problem);
   }
 }

@@ -208,6 +208,8 @@ test("a newer stream takes the place of an older one", async () => {
   sameAsTheLibrary([await newer.track(clip.frames[2])], 2);
   const problem = await older.ended;
   assert.ok(problem instanceof Problem && problem.slug === "replaced", String(problem));
+  // One that comes too late is told why.
+  await assert.rejects(older.track(clip.frames[2]), (error) => error === problem);
   newer.close();
 });
 

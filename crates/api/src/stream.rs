@@ -19,6 +19,22 @@ pub struct FrameHeader {
     pub see: bool,
 }
 
+impl FrameHeader {
+    /// What this and a later text say of one frame. None, where they are about two targets.
+    pub fn and(self, later: Self) -> Option<Self> {
+        let is_of_target = |header: &Self| header.rect.is_some() || header.see;
+        let target = |header: &Self| header.target.unwrap_or(0);
+        let is_of_two = target(&self) != target(&later);
+        let merged = Self {
+            frame: later.frame.or(self.frame),
+            rect: later.rect.or(self.rect),
+            target: later.target.or(self.target),
+            see: later.see || self.see,
+        };
+        (!(is_of_two && is_of_target(&self) && is_of_target(&later))).then_some(merged)
+    }
+}
+
 /// The first message of the service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Hello {

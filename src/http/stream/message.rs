@@ -5,7 +5,8 @@ use crate::http::problems::problem::Problem;
 use bagtrack_api::FrameHeader;
 use bagtrack_sessions::GivenBox;
 
-const MAX_TEXT_BYTES: usize = 4096;
+/// Most bytes of a text message.
+pub const MAX_TEXT_BYTES: usize = 4096;
 
 /// The correction, where there is one.
 pub fn correction(header: &FrameHeader) -> Option<GivenBox> {
@@ -18,18 +19,16 @@ pub fn correction(header: &FrameHeader) -> Option<GivenBox> {
 /// # Errors
 /// They are about two targets.
 pub fn merged(earlier: FrameHeader, later: FrameHeader) -> Result<FrameHeader, Problem> {
-    let is_of_target = |header: &FrameHeader| header.rect.is_some() || header.see;
-    let target = |header: &FrameHeader| header.target.unwrap_or(0);
-    if is_of_target(&earlier) && is_of_target(&later) && target(&earlier) != target(&later) {
-        let detail = "The texts before this frame name two targets; a frame takes one.";
-        return Err(Problem::malformed(detail));
-    }
-    Ok(FrameHeader {
-        frame: later.frame.or(earlier.frame),
-        rect: later.rect.or(earlier.rect),
-        target: later.target.or(earlier.target),
-        see: later.see || earlier.see,
-    })
+    let detail = "The texts before this frame name two targets; a frame takes one.";
+    let merged = earlier.and(later);
+    merged.ok_or_else(|| Problem::malformed(detail))
+}
+
+/// The problem of a text message that is too long to say anything of a frame.
+pub fn too_long() -> Problem {
+    let detail =
+        format!("A text may have at most {MAX_TEXT_BYTES} bytes: send frames as binary messages.");
+    Problem::malformed(detail)
 }
 
 /// Reads a text message.
@@ -37,14 +36,10 @@ pub fn merged(earlier: FrameHeader, later: FrameHeader) -> Result<FrameHeader, P
 /// # Errors
 /// It is no such JSON.
 pub fn parse(text: &str) -> Result<FrameHeader, Problem> {
-    if text.len() > MAX_TEXT_BYTES {
-        let detail = format!("A text message may have at most {MAX_TEXT_BYTES} bytes.");
-        return Err(Problem::malformed(detail));
-    }
     serde_json::from_str(text).map_err(|error| {
         let detail = format!(
-            "The text message before the frame cannot be read: {error}. Send {{\"frame\": N}}, {{\"box\": …}} or \
-             both."
+            "The text message before the frame cannot be read: {error}. Send an object of `frame`, `box`, `target` and \
+             `see`, or of some of them. Frames are binary messages."
         );
         Problem::malformed(detail)
     })

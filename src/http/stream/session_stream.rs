@@ -183,6 +183,10 @@ impl SessionStream {
             Some(Ok(Message::Close(_))) => return Some(End::Closed),
             Some(Ok(Message::Text(text))) => {
                 drop(socket.get_mut().take_charge());
+                if text.len() > message::MAX_TEXT_BYTES {
+                    self.work.waiting().push(Err(message::too_long()));
+                    return None;
+                }
                 let earlier = std::mem::replace(header, Ok(FrameHeader::default()));
                 let merged = |earlier| message::merged(earlier, message::parse(&text)?);
                 *header = earlier.and_then(merged);

@@ -53,6 +53,14 @@ async fn a_box_before_a_frame_corrects_the_target() {
         (Some(1), Some(1.0))
     );
     assert_eq!(stream.message().await["frame"], 2);
+    // A frame that is sent as text is told at once: nothing else would come.
+    stream.say(&"A".repeat(5000)).await;
+    let as_text = stream.message().await;
+    assert_eq!(problem_slug(&as_text), "malformed-request");
+    assert!(
+        as_text["detail"].as_str().unwrap().contains("binary"),
+        "{as_text}"
+    );
     // What cannot be read is told, whatever comes after it, and so are two targets of one frame.
     for earlier in [r#"{"box": 1}"#, r#"{"see": true, "target": 1}"#] {
         stream.say(earlier).await;
