@@ -41,8 +41,8 @@ def propagate(
     of their names (for all of these OpenCV must be installed), a sequence of arrays, or anything that gives arrays one
     after the other. `boxes` is one box or several; the trackers are those of `bagtrack track` with the same seed.
 
-    At most `count` frames are tracked after the first one; `backwards` goes to frame 0, through a file, a folder or a
-    sequence. With `until_lost` a target's last answer is the one in which it is lost, and the frames end with the last
+    At most `count` frames are tracked after the first one; `backwards` goes from `start` to frame 0, through a file, a
+    folder or a sequence. With `until_lost` a target's last answer is the one in which it is lost, and the frames end with the last
     target. With `keyframes` only those answers are given, at the end, between which linear interpolation gives every
     edge of every box to within a pixel, or to within as many as it says.
 
@@ -53,6 +53,8 @@ def propagate(
         raise ValueError("boxes are one box, or several: x, y, width, height each")
     if start < 0 or (count is not None and count < 0):
         raise ValueError("start and count are 0 or more")
+    if backwards and start == 0:
+        raise ValueError("to go backwards give start, the frame of the boxes")
     targets = np.atleast_2d(given)
     tracker = Tracker(preset, seed, **params)
     trackers = [tracker.of_target(target) for target in range(len(targets))]

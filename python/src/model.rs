@@ -5,9 +5,9 @@ use bagtrack_tracker::{Expert, InDoubt};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyType;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::{fs, io};
 
 /// A network that gives trackers a second opinion. Trackers share it.
 #[pyclass(name = "NanoTrack", module = "bagtrack", frozen)]
@@ -59,7 +59,11 @@ impl PyNanoTrack {
 
 /// The network in two files. `OSError` for a file that cannot be read, `ValueError` for one that is no such network.
 fn load(backbone: &Path, head: &Path) -> PyResult<NanoTrack> {
-    NanoTrack::from_onnx(&fs::read(backbone)?, &fs::read(head)?).map_err(|error| {
+    let read = |path: &Path| {
+        fs::read(path)
+            .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))
+    };
+    NanoTrack::from_onnx(&read(backbone)?, &read(head)?).map_err(|error| {
         let (backbone, head) = (backbone.display(), head.display());
         PyValueError::new_err(format!("{backbone} and {head} are no NanoTrack: {error}"))
     })

@@ -93,6 +93,8 @@ def test_what_cannot_be_used_is_told(clip: Clip) -> None:
             list(bagtrack.propagate(frames, boxes))
     with pytest.raises(ValueError, match="backwards"):
         list(bagtrack.propagate(iter(frames), clip.box, start=2, backwards=True))
+    with pytest.raises(ValueError, match="give start"):
+        list(bagtrack.propagate(frames, clip.box, backwards=True))
     with pytest.raises(ValueError, match="cannot be read"):
         list(bagtrack.propagate("no-such-file.mp4", clip.box))
     # Which of a thousand it was, was not said.

@@ -138,7 +138,7 @@ def test_a_tracker_with_a_network_goes_on_with_the_same_one_alone(clip: Clip, ne
         bagtrack.Tracker.load(tracker.save())
     with pytest.raises(ValueError):
         bagtrack.Tracker.load(tracker.save(), bagtrack.NanoTrack(*network, in_doubt=True))
-    with pytest.raises(OSError):
+    with pytest.raises(FileNotFoundError, match="nowhere.onnx"):
         bagtrack.NanoTrack(network[0], "nowhere.onnx")
     with pytest.raises(ValueError, match="no NanoTrack"):
         bagtrack.NanoTrack(network[1], network[0])

@@ -77,6 +77,8 @@ export declare class FrameStream {
         until: number;
     } | undefined;
     isRenewing: boolean;
+    /** @type {Error | undefined} What a frame is told that comes too late. */
+    whyEnded: Error | undefined;
     /** @type {(problem: Error | undefined) => void} */
     resolveEnded: (problem: Error | undefined) => void;
     /** @type {Promise<Error | undefined>} The stream has ended: why, if it was not by `close`. */
