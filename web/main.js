@@ -40,7 +40,7 @@ get("stop").addEventListener("click", () => {
  * @param {number} by */
 function step(by) {
   if (page.state === "first") page.beginning.step(by);
-  else if (page.shown) page.timeline.go(page.shown.frame + by);
+  else page.player.step(by);
 }
 get("back").addEventListener("click", () => step(-1));
 get("forward").addEventListener("click", () => step(1));

@@ -29,7 +29,7 @@ export class Page {
     this.client = undefined;
     this.message = new Message(get("message"));
     this.stage = new Stage(canvas("picture"), canvas("overlay"));
-    this.timeline = new Timeline(canvas("timeline"), (frame) => this.seek(frame));
+    this.timeline = new Timeline(canvas("timeline"), (frame) => this.seek(frame), (by) => this.player.step(by));
     this.seen = new Seen();
     this.editing = new Editing(this);
     this.opening = new Opening(this);

@@ -31,6 +31,17 @@ export class Player {
     if (this.isPlaying) this.page.view += 1;
   }
 
+  /** Shows a frame that is so many before or after the one that is shown: numbers have gaps where frames were skipped.
+   * @param {number} by */
+  step(by) {
+    const { run, shown } = this.page;
+    if (!run || !shown) return;
+    const numbers = run.frames.shown;
+    const there = numbers.filter((number) => (by < 0 ? number < shown.frame : number > shown.frame));
+    const wanted = there.at(by < 0 ? by : by - 1) ?? numbers.at(by < 0 ? 0 : -1);
+    if (wanted !== undefined) this.page.seek(wanted);
+  }
+
   /** Takes the frames after the last one. */
   async goOn() {
     const { page } = this;

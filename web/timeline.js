@@ -13,8 +13,9 @@ export class Timeline {
   /**
    * @param {HTMLCanvasElement} canvas
    * @param {(frame: number) => void} seek Is told which frame shall be shown.
+   * @param {(by: number) => void} step Is told how many frames before or after it.
    */
-  constructor(canvas, seek) {
+  constructor(canvas, seek, step) {
     this.canvas = canvas;
     this.seek = seek;
     this.isDue = false;
@@ -43,7 +44,7 @@ export class Timeline {
       const steps = STEPS[event.key];
       if (steps === undefined) return;
       event.preventDefault();
-      this.go(this.shown + steps);
+      step(steps);
     });
     new ResizeObserver(() => this.repaint()).observe(canvas);
   }

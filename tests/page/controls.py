@@ -3,7 +3,21 @@
 import json
 import time
 
-from browser import DRAW, TO_THE_END, choose, corners, drag, frames, held, kept_rows, said, saved, to_the_end
+from browser import (
+    DRAW,
+    TO_THE_END,
+    choose,
+    corners,
+    drag,
+    frames,
+    held,
+    kept_rows,
+    said,
+    saved,
+    to_the_end,
+)
+from clips import H264
+from files import sent_box
 from studio import shown, to_frame
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True, "device_scale_factor": 2}
@@ -203,4 +217,38 @@ def drag_that_does_not_end(checks):
     page.context.close()
 
 
-ALL = [objects_by_keyboard, focus_in_the_list, keyboard_of_other_letters, second_finger, drag_that_does_not_end]
+def steps_over_a_gap(checks):
+    """Where frames were skipped, as a camera does, keys and buttons step to the next one that was tracked."""
+    path = checks.files.file("clip.mp4", 30, H264)
+    box = sent_box(checks.files.truth[0])
+    table = [[frame, frame / 30, *box, 1, "tracking", int(frame == 0)] for frame in (0, 5, 10, 20, 40)]
+    project = checks.files.folder / "gaps.bagtrack.json"
+    video = {"name": "clip.mp4", "width": 1056, "height": 792}
+    document = {"bagtrack_project": 1, "video": video, "ended": True, "objects": [{"rows": table}]}
+    project.write_text(json.dumps(document))
+    page = checks.page(where="here")
+    page.locator("#file").set_input_files([project, path])
+    said(page, "clip.mp4 is here again")
+    page.locator("#timeline").focus()
+    for key, frame in (("Home", 0), ("ArrowRight", 5), ("PageDown", 40), ("ArrowLeft", 20), ("PageUp", 0), ("f", 5)):
+        page.keyboard.press(key)
+        shown(page, frame)
+    page.locator("#forward").click()
+    shown(page, 10)
+    page.locator("#picture").focus()
+    for key, frame in (("ArrowRight", 20), ("f", 40), ("d", 20), ("ArrowLeft", 10)):
+        page.keyboard.press(key)
+        shown(page, frame)
+    page.locator("#back").click()
+    shown(page, 5)
+    page.context.close()
+
+
+ALL = [
+    objects_by_keyboard,
+    focus_in_the_list,
+    keyboard_of_other_letters,
+    second_finger,
+    drag_that_does_not_end,
+    steps_over_a_gap,
+]
