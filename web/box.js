@@ -43,6 +43,8 @@ export class BoxDrawing {
     const lost = () => this.from && this.cancel();
     canvas.addEventListener("lostpointercapture", ({ pointerId }) => pointerId === this.pointer && lost());
     addEventListener("blur", lost);
+    // Keys are the box's own no more, and the picture would stay dark. Another window gives the focus back.
+    canvas.addEventListener("blur", () => this.box && !this.from && document.hasFocus() && this.cancel());
     canvas.addEventListener("keydown", (event) => this.key(event));
   }
 

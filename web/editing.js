@@ -149,6 +149,13 @@ export class Editing {
     this.cancelling.abort();
   }
 
+  /** Gives up the box that is drawn, else what is tracked again. */
+  escape() {
+    const { drawing } = this;
+    if (drawing.box || drawing.from) drawing.cancel();
+    else this.cancel();
+  }
+
   async undo() {
     const { run } = this.page;
     if (!run || run.isRedoing || run.isOver || this.undoing.steps.length === 0) return;
@@ -179,6 +186,7 @@ export class Editing {
   reset() {
     this.cancel();
     this.undoing = new Undoing();
+    this.drawing.cancel();
     this.drawing.arm(false);
     this.add(false);
   }

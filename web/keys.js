@@ -20,9 +20,10 @@ export function press(event, page, step) {
   const { target, defaultPrevented } = event;
   const key = keyOf(event);
   const isIn = (/** @type {string} */ controls) => target instanceof Element && target.closest(controls) !== null;
+  if (!page.run || defaultPrevented || isIn(TEXT)) return;
+  if (key === "Escape") return page.editing.escape();
   // While a box is moved, the keys are its own.
-  if (!page.run || defaultPrevented || isIn(TEXT) || page.editing.drawing.box) return;
-  if (key === "Escape") return page.editing.cancel();
+  if (page.editing.drawing.box) return;
   const isUndoing = key.toLowerCase() === "z" && (event.ctrlKey || event.metaKey) && !event.shiftKey && !event.altKey;
   const isChord = event.ctrlKey || event.metaKey || event.altKey;
   const isSpace = key === " " && page.hasRows && !isIn(SPACE);

@@ -13,7 +13,9 @@ from browser import (
     held,
     kept_rows,
     said,
+    say_nothing,
     saved,
+    stop,
     to_the_end,
 )
 from clips import H264
@@ -244,6 +246,54 @@ def steps_over_a_gap(checks):
     page.context.close()
 
 
+def box_of_another_source(checks):
+    """A box that is drawn as another source arrives is given up: it is not taken in that, and keys do what they do."""
+    for begin, end in (
+        (lambda page: page.keyboard.press("Enter"), lambda page: None),
+        (lambda page: (page.mouse.move(400, 400), page.mouse.down(), page.mouse.move(500, 500)), lambda page: page.mouse.up()),
+    ):
+        page = checks.page(where="here")
+        choose(page, "card")
+        page.locator("#picture").focus()
+        begin(page)
+        say_nothing(page)
+        # As a file that is dropped: a click would take the focus.
+        page.evaluate("document.getElementById('leaves').click()")
+        said(page, DRAW)
+        page.mouse.move(520, 510)
+        end(page)
+        assert page.locator("body").get_attribute("data-state") == "first", "the box was taken"
+        page.keyboard.press("f")
+        page.locator("#begin-time").filter(has_text=", frame 1").wait_for(timeout=20_000)
+        page.context.close()
+
+
+def box_left_by_the_keyboard(checks):
+    """A box that the keyboard has begun is given up with Escape, and where the focus goes elsewhere: the run goes on."""
+    page = checks.page(where="here")
+    # It waits for this frame: it cannot have ended.
+    page.route("**/sample/card/140.jpg", lambda route: None)
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 5)
+    page.locator("#picture").focus()
+    page.keyboard.press("Enter")
+    before = int(page.locator("#frames").inner_text())
+    page.locator("#pause").click()
+    page.locator("body[data-state=paused]").wait_for()
+    page.locator("#pause").click()
+    frames(page, before + 20)
+    page.keyboard.press("Space")
+    page.locator("body[data-state=paused]").wait_for(timeout=20_000)
+    page.locator("#picture").focus()
+    page.keyboard.press("Enter")
+    page.evaluate("() => void dispatchEvent(new KeyboardEvent('keydown', { key: 'Escape' }))")
+    page.keyboard.press("Space")
+    page.locator("body[data-state=following]").wait_for(timeout=20_000)
+    stop(page)
+    page.context.close()
+
+
 ALL = [
     objects_by_keyboard,
     focus_in_the_list,
@@ -251,4 +301,6 @@ ALL = [
     second_finger,
     drag_that_does_not_end,
     steps_over_a_gap,
+    box_of_another_source,
+    box_left_by_the_keyboard,
 ]
