@@ -189,6 +189,9 @@ export class Editing {
     this.drawing.cancel();
     this.drawing.arm(false);
     this.add(false);
+    this.list.show([], undefined);
+    this.show();
+    button("backwards").disabled = true;
   }
 
   /** Makes the next box that of a new object, or not.

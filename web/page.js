@@ -146,9 +146,11 @@ export class Page {
     this.run = undefined;
     this.again = undefined;
     this.frozen = undefined;
+    this.particles = undefined;
     this.isUnsaved = false;
     this.editing.reset();
     this.seen.reset();
+    this.timeline.show([], 0, 0, 0);
     get("handed").replaceChildren();
     get("key-form").hidden = true;
     this.leave();
@@ -247,10 +249,10 @@ export class Page {
   async seek(frame) {
     const { run } = this;
     if (!run || !this.hasRows || run.isRedoing || frame === this.shown?.frame) return;
-    const wanted = (this.view += 1);
-    this.pause(true);
     const { shown } = run.frames;
     if (shown.length === 0) return;
+    const wanted = (this.view += 1);
+    this.pause(true);
     const nearest = shown.reduce((one, other) => (Math.abs(other - frame) < Math.abs(one - frame) ? other : one));
     if (nearest === run.lastFrame) {
       this.leave();

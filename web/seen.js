@@ -39,6 +39,8 @@ export class Seen {
     this.shown = undefined;
     this.views?.votes.reset();
     this.fit();
+    this.score(undefined);
+    for (const id of ["frames", "rate", "trip", "skipped"]) get(id).textContent = "–";
   }
 
   fit() {

@@ -90,6 +90,8 @@ export class Timeline {
     const { canvas, rows, last, shown, end } = this;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
     [canvas.width, canvas.height] = [width, height].map((side) => Math.round(side * devicePixelRatio));
+    const told = (/** @type {number} */ frame) => rows.find((row) => row.frame === frame);
+    this.describe(told(shown));
     const context = canvas.getContext("2d");
     if (!context || width === 0 || rows.length === 0) return;
     context.scale(devicePixelRatio, devicePixelRatio);
@@ -99,10 +101,8 @@ export class Timeline {
     sheet.ruler(last);
     sheet.curve(rows);
     for (const { frame, corrected } of rows) if (corrected) sheet.mark(frame);
-    const told = (/** @type {number} */ frame) => rows.find((row) => row.frame === frame);
     if (this.hovered !== undefined && this.hovered !== shown) sheet.line(this.hovered, told(this.hovered), false);
     sheet.line(shown, told(shown), true);
-    this.describe(told(shown));
   }
 
   /** @param {Row | undefined} row Of the frame that is shown. */

@@ -247,6 +247,38 @@ def saved_to_the_service(checks):
         service.stop()
 
 
+def panel_of_a_new_source(checks):
+    """Until its first box is answered, there is nothing of the run before beside a new source: no object to delete, no
+    frame on the timeline, no figure."""
+    page = checks.page(where="here")
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 20)
+    page.locator("#stop").click()
+    kept_rows(page)
+    held = []
+    page.route("**/sessions/*?*box=*", lambda route: held.append(route))
+    page.locator("#there").evaluate("button => button.click()")
+    # Its sources are in a menu by now.
+    page.evaluate("document.getElementById('leaves').click()")
+    said(page, "Draw a box around what to follow")
+    with page.expect_request("**/sessions/*?*box=*"):
+        drag(page, checks.clips["leaves"]["truth"][0])
+    said(page, "Beginning")
+    told = {name: page.locator(f"#{name}").inner_text() for name in ("status", "score", "frames", "rate", "trip", "skipped")}
+    assert set(told.values()) == {"–"}, told
+    assert page.locator("#list li").count() == 0, page.locator("#list").inner_html()
+    assert page.locator("#undo").is_disabled() and page.locator("#backwards").is_disabled()
+    shown(page, 0)
+    page.locator("#timeline").click()
+    page.locator("#timeline").press("End")
+    assert page.locator("body").get_attribute("data-state") == "following", "the old timeline has paused it"
+    held[0].continue_()
+    frames(page, 10)
+    assert page.get_by_label("Delete Object 1").count() == 1
+    page.context.close()
+
+
 FARTHEST = """() => {
     const own = CanvasRenderingContext2D.prototype.roundRect;
     window.farthest = 0;
@@ -341,6 +373,7 @@ ALL = [
     tracked_backwards,
     long_video,
     saved_to_the_service,
+    panel_of_a_new_source,
     long_names,
     seen_no_more,
     colors_of_the_system,
