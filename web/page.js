@@ -97,7 +97,7 @@ export class Page {
     }
     get("begin").hidden = state !== "first" || !this.run?.source.goTo;
     get("hand-over").hidden = !this.run?.isLocal;
-    button("pause").textContent = { paused: "Go on", ended: "Play" }[String(state)] ?? "Pause";
+    this.player.tell();
     get("resume").hidden = state !== "ended" || !this.canGoOn;
     sources.open = state === "start";
   }
@@ -272,7 +272,8 @@ export class Page {
 
   /** @param {boolean} isPaused */
   pause(isPaused) {
-    if (this.state !== "ended") this.enter(isPaused ? "paused" : "following");
+    if (this.state === "ended") this.player.tell();
+    else this.enter(isPaused ? "paused" : "following");
     if (!isPaused) this.leave();
     this.repaint();
     this.run?.pause(isPaused);

@@ -29,6 +29,7 @@ export class Player {
   /** Stays at the frame that it shows. */
   stop() {
     if (this.isPlaying) this.page.view += 1;
+    this.tell();
   }
 
   /** Shows a frame that is so many before or after the one that is shown: numbers have gaps where frames were skipped.
@@ -70,8 +71,10 @@ export class Player {
     const left = shown.frame === run.lastFrame ? numbers : numbers.filter((number) => number > shown.frame);
     if (left.length === 0) return;
     const timeOf = (/** @type {number} */ frame) => run.frames.times.get(frame) ?? 0;
-    this.view = page.view += 1;
-    this.say(true);
+    const view = (this.view = page.view += 1);
+    // One that was paused may still wait, while another plays.
+    const isOwn = () => this.isPlaying && view === this.view;
+    this.tell();
     const begun = performance.now() - 1000 * timeOf(left[0]);
     for (const [at, frame] of left.entries()) {
       const next = left[at + 1];
@@ -80,24 +83,25 @@ export class Player {
       const picture = await run.frames.at(frame).catch(() => undefined);
       const early = begun + 1000 * timeOf(frame) - performance.now();
       if (early > 0) await new Promise((resolve) => setTimeout(resolve, early));
-      if (!this.isPlaying || run !== page.run || (!picture && run.isGone)) break;
+      if (!isOwn() || (!picture && run.isGone)) break;
       if (!picture) continue;
       const { viewed } = page;
       page.viewed = picture;
       page.show(picture);
       if (viewed) close(viewed);
     }
-    if (run !== page.run || page.state !== "ended") return;
-    if (this.isPlaying) {
+    if (isOwn()) {
       page.leave();
       page.repaint();
     }
-    this.say(false);
+    this.tell();
   }
 
-  /** @param {boolean} isPlaying */
-  say(isPlaying) {
-    button("pause").textContent = isPlaying ? "Pause" : "Play";
-    button("pause").classList.toggle("playing", isPlaying);
+  /** Says what the button in the middle does. */
+  tell() {
+    const { state } = this.page;
+    const rests = state === "ended" && !this.isPlaying;
+    button("pause").textContent = state === "paused" ? "Go on" : rests ? "Play" : "Pause";
+    button("pause").classList.toggle("playing", this.isPlaying);
   }
 }

@@ -420,6 +420,28 @@ def played_again(checks):
     page.context.close()
 
 
+def gone_on_while_it_plays(checks):
+    """Where one goes on while it plays, the button in the middle shows what it does after the next stop."""
+    page = checks.page(where="here")
+    # It waits for this frame: it cannot have ended.
+    page.route("**/sample/card/120.jpg", lambda route: None)
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 60)
+    page.locator("#stop").click()
+    kept_rows(page)
+    page.locator("#pause").click()
+    page.locator("#pause.playing").wait_for()
+    page.locator("#resume").click()
+    page.locator("body[data-state=following]").wait_for()
+    page.wait_for_timeout(500)
+    page.locator("#stop").click()
+    page.locator("body[data-state=ended]").wait_for()
+    assert page.locator("#pause").inner_text() == "Play"
+    assert page.locator("#pause.playing").count() == 0, "its icon is that of a pause"
+    page.context.close()
+
+
 ALL = [
     stopped_with_the_service,
     service_with_other_keys,
@@ -435,4 +457,5 @@ ALL = [
     worker_ended,
     drawn_before_it_is_shown,
     played_again,
+    gone_on_while_it_plays,
 ]
