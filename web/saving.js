@@ -9,7 +9,9 @@ const modules = () => Promise.all([import("./save.js"), import("./recording.js")
 export function offerSaving(page) {
   get("results").addEventListener("click", async ({ target }) => {
     const format = target instanceof HTMLElement ? target.closest("button")?.id.replace("save-", "") : undefined;
-    if (!format || !page.run || page.run.objects.length === 0) return;
+    if (!format || !page.run) return;
+    // The listeners of the two other buttons leave that to this one.
+    if (page.run.objects.length === 0) return page.say("There is no object to save.");
     try {
       const [{ FORMATS, save }] = await modules();
       const found = FORMATS[format];
@@ -65,7 +67,7 @@ async function saveVideo(page) {
  * @param {Page} page */
 async function giveAway(page) {
   const { run } = page;
-  if (!run) return;
+  if (!run || run.objects.length === 0) return;
   button("hand-over").disabled = true;
   try {
     const handed = await (await modules())[2].handOver(run, await page.service());
