@@ -3,7 +3,6 @@
 import { BoxDrawing } from "./box.js";
 import { button, canvas, get } from "./dom.js";
 import { ObjectList } from "./list.js";
-import { FOLLOWING } from "./message.js";
 import { MOST_OBJECTS } from "./objects.js";
 import { words } from "./problems.js";
 import { Undoing } from "./undo.js";
@@ -149,11 +148,13 @@ export class Editing {
     this.cancelling.abort();
   }
 
-  /** Gives up the box that is drawn, else what is tracked again. */
+  /** Gives up the box that is drawn, else to draw one, and what is tracked again. */
   escape() {
     const { drawing } = this;
-    if (drawing.box || drawing.from) drawing.cancel();
-    else this.cancel();
+    if (drawing.box || drawing.from) return drawing.cancel();
+    if (this.isAdding) this.toggleAdding();
+    drawing.arm(false);
+    this.cancel();
   }
 
   async undo() {
@@ -204,10 +205,11 @@ export class Editing {
   toggleAdding() {
     const { run } = this.page;
     if (!run || run.isOver || this.wantsVideo(run)) return;
-    if (run.objects.length >= MOST_OBJECTS) return this.page.say(`No more than ${MOST_OBJECTS} objects are followed.`);
-    this.add(!this.isAdding);
-    if (this.isAdding) this.drawing.arm(true);
-    this.page.say(this.isAdding ? ADD : FOLLOWING);
+    const isOn = !this.isAdding;
+    if (isOn && run.objects.length >= MOST_OBJECTS) return this.page.say(`No more than ${MOST_OBJECTS} objects are followed.`);
+    this.add(isOn);
+    this.drawing.arm(isOn);
+    this.page.say(isOn ? ADD : "No object is added.");
   }
 
   makeList() {

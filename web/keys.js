@@ -30,9 +30,9 @@ export function press(event, page, step) {
   const isArrow = key.startsWith("Arrow") && !isIn(ARROWS);
   if (isUndoing) page.editing.undo();
   else if (isChord) return;
-  else if (isSpace) button("pause").click();
+  else if (isSpace && !event.repeat) button("pause").click();
   else if (key.toLowerCase() === "d" || (isArrow && key === "ArrowLeft")) step(-1);
   else if (key.toLowerCase() === "f" || (isArrow && key === "ArrowRight")) step(1);
-  else return;
+  else if (!isSpace) return;
   event.preventDefault();
 }

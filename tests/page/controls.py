@@ -294,6 +294,37 @@ def box_left_by_the_keyboard(checks):
     page.context.close()
 
 
+def adding_given_up(checks):
+    """"Add an object" pressed again, and Escape, give up to draw one; where there is none, each button that saves says so.
+    Space that is held pauses once."""
+    page = checks.page(where="here")
+    # It waits for this frame: it cannot have ended.
+    page.route("**/sample/card/140.jpg", lambda route: None)
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 5)
+    for _ in range(4):
+        page.keyboard.down("Space")
+    page.keyboard.up("Space")
+    page.locator("body[data-state=paused]").wait_for(timeout=20_000)
+    for again in (lambda: page.locator("#add").click(), lambda: page.keyboard.press("Escape")):
+        page.locator("#add").click()
+        said(page, "Draw a box around the object to add")
+        again()
+        page.locator("#add[aria-pressed=false]").wait_for(timeout=20_000)
+        page.locator("#draw[aria-pressed=false]").wait_for(state="attached", timeout=20_000)
+        said(page, "No object is added")
+    page.get_by_label("Delete Object 1").click()
+    for name in ("project", "csv", "video"):
+        say_nothing(page)
+        page.locator(f"#save-{name}").click()
+        said(page, "There is no object to save")
+    say_nothing(page)
+    page.locator("#hand-over").click()
+    said(page, "There is no object to save")
+    page.context.close()
+
+
 ALL = [
     objects_by_keyboard,
     focus_in_the_list,
@@ -303,4 +334,5 @@ ALL = [
     steps_over_a_gap,
     box_of_another_source,
     box_left_by_the_keyboard,
+    adding_given_up,
 ]
