@@ -74,14 +74,15 @@ export class LocalFollower {
   /** @param {Picture} picture
    * @param {Box} box */
   async open(picture, box) {
-    this.session = await this.client.open(picture.image, box);
-    return this.session;
+    const session = await this.client.open(picture.image, box);
+    this.end();
+    return (this.session = session);
   }
 
   /** @param {Uint8Array<ArrayBuffer>} saved */
   async restore(saved) {
     const session = await this.client.restore(saved);
-    this.session?.end().catch(() => undefined);
+    this.end();
     this.session = session;
     return session.frame;
   }
@@ -141,6 +142,8 @@ export class ServiceFollower {
    * @returns {Promise<Answer>} */
   async open(picture, box) {
     const session = await this.client.open(picture.blob, box);
+    // It may be at work on a state that was of too late a frame.
+    this.leave();
     this.last = { picture, box: session.box };
     this.connect(session);
     return { frame: 0, box: session.box, score: 1, status: "tracking" };
@@ -217,7 +220,7 @@ export class ServiceFollower {
 
   /** Goes on in another session, from the last picture and its box. */
   async goOn() {
-    this.stream = undefined;
+    this.session = this.stream = undefined;
     this.hasAnswered = false;
     try {
       if (!this.last) return;

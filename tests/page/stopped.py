@@ -258,6 +258,26 @@ def no_session_is_left(checks):
     service.stop()
 
 
+def corrections_leave_no_session(checks):
+    """A correction in a frame before the first state that is kept, and what undoes it: no session is left of either."""
+    service = Service(checks.program, "--session-first", "10m")
+    page = checks.page(url=service.url)
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 40)
+    page.locator("#stop").click()
+    kept_rows(page)
+    to_frame(page, 10)
+    drag(page, OFF)
+    said(page, "Followed anew from frame 10")
+    service.wait_for_no_session()
+    page.locator("#undo").click()
+    said(page, "is undone")
+    service.wait_for_no_session()
+    page.context.close()
+    service.stop()
+
+
 def stopped_before_the_first_box(checks):
     """A run is stopped while its first box is on its way: it goes on once that is followed, or another one is drawn."""
     refused = {"status": 422, "content_type": "application/problem+json", "body": '{"status": 422}'}
@@ -451,6 +471,7 @@ ALL = [
     stopped_after_a_reload,
     failed_after_it_was_left,
     no_session_is_left,
+    corrections_leave_no_session,
     stopped_before_the_first_box,
     offline,
     sample_broken_off,
