@@ -154,9 +154,15 @@ async function goOn(run, source) {
     }
     [run.isResting, run.hasAll, run.failure] = [false, false, undefined];
     for (const object of run.objects) {
+      // It may be deleted meanwhile, or the run left.
+      const isGone = () => run.isOver || !run.objects.includes(object);
+      if (isGone()) continue;
       object.follower.end();
       object.follower = run.follower();
-      await catchUp(run, object);
+      await catchUp(run, object).catch((error) => {
+        if (!isGone()) throw error;
+      });
+      if (isGone()) object.follower.end();
     }
     await source.goTo?.(run.picture.time, run.picture.frame);
   });

@@ -171,7 +171,10 @@ HELD = """(count) => {
     let given = 0;
     const released = new Promise((resolve) => (window.release = resolve));
     window.createImageBitmap = async (...what) => {
-        if ((given += 1) > count) await released;
+        if ((given += 1) > count) {
+            window.isHeld = true;
+            await released;
+        }
         return own(...what);
     };
 }"""
@@ -198,6 +201,14 @@ def held(page, count):
     """Lets the page read this many of the frames that it keeps; the next one waits for what this returns."""
     page.evaluate(HELD, count)
     return lambda: page.evaluate("window.release()")
+
+
+def is_held(page):
+    """Waits until a frame is held."""
+    late = time.monotonic() + TO_THE_END / 1000
+    while not page.evaluate("window.isHeld"):
+        assert time.monotonic() < late, "no frame is read"
+        page.wait_for_timeout(50)
 
 
 def stop(page):

@@ -10,6 +10,7 @@ from browser import (
     frames,
     held,
     held_file,
+    is_held,
     kept_rows,
     near,
     numbers,
@@ -278,6 +279,39 @@ def corrections_leave_no_session(checks):
     service.stop()
 
 
+def deleted_as_it_goes_on(checks):
+    """Objects are deleted while a stopped run is gone on with: the one at work and one whose turn has not come. The one
+    between them is followed on, and no session is left."""
+    for where in ("here", "there"):
+        service = Service(checks.program, "--session-first", "10m")
+        page = checks.page(url=service.url, where=where)
+        choose(page, "card")
+        drag(page, OFF)
+        frames(page, 40)
+        page.locator("#pause").click()
+        for at, box in enumerate((checks.clips["card"]["truth"][len(kept_rows(page)) - 1], [400, 200, 60, 60])):
+            page.locator("#add").click()
+            drag(page, box)
+            page.locator(f"#list li:nth-child({at + 2})").wait_for()
+        page.locator("#stop").click()
+        kept_rows(page)
+        # Two are read as the clip is opened anew.
+        release = held(page, 2)
+        page.locator("#resume").click()
+        is_held(page)
+        for name in ("Object 1", "Object 3"):
+            page.get_by_role("button", name=f"Delete {name}").click()
+        release()
+        to_the_end(page)
+        table = rows(page)
+        assert {row["target"] for row in table} == {"1"}, where
+        assert [int(row["frame"]) for row in table] == list(range(150 - len(table), 150)), where
+        if where == "there":
+            service.wait_for_no_session()
+        page.context.close()
+        service.stop()
+
+
 def stopped_before_the_first_box(checks):
     """A run is stopped while its first box is on its way: it goes on once that is followed, or another one is drawn."""
     refused = {"status": 422, "content_type": "application/problem+json", "body": '{"status": 422}'}
@@ -472,6 +506,7 @@ ALL = [
     failed_after_it_was_left,
     no_session_is_left,
     corrections_leave_no_session,
+    deleted_as_it_goes_on,
     stopped_before_the_first_box,
     offline,
     sample_broken_off,
