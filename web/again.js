@@ -21,6 +21,7 @@ import { close } from "./frames.js";
  */
 export async function trackOn(run, known, frame, box, { tell, signal }) {
   // A box that the run stopped before is older.
+  if (run.underWay.length === 0) run.drawn?.refused();
   run.drawn = undefined;
   const object = known ?? run.newObject();
   const draft = object.draft(run.follower());

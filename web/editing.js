@@ -14,6 +14,7 @@ export const DRAW = "Draw a box around what to follow.";
 export const TAP = matchMedia("(pointer: coarse)").matches ? "Tap Draw. " : "";
 const ABSENT = "Nothing can be tracked without the video.";
 const ADD = "Draw a box around the object to add.";
+const ON_ITS_WAY = "The box of the new object is on its way. Draw once it is followed.";
 
 export class Editing {
   /** @param {Page} page */
@@ -60,6 +61,12 @@ export class Editing {
     if (!run || run.isOver || run.isRedoing || this.page.state === "opening" || this.wantsVideo(run)) return false;
     // The first box is on its way.
     if (this.page.hasRows && run.count === 0) return false;
+    const { drawn, isResting, underWay } = run;
+    // What a run that is stopped has not sent is given up.
+    if (drawn && !drawn.object && !(isResting && underWay.length === 0)) {
+      this.page.say(ON_ITS_WAY);
+      return false;
+    }
     this.page.player.stop();
     if (this.page.hasRows) run.pause(true);
     else if (run.source.isLive) {

@@ -39,12 +39,23 @@ export class Undoing {
    * @returns {Promise<string | undefined>} The name of the object, where it is there. */
   async undo(run) {
     const [step] = this.steps.slice(-1);
-    const object = step.deleted ?? run.objects.find(({ number }) => number === step.number);
+    const find = () => step.deleted ?? run.objects.find(({ number }) => number === step.number);
+    let object = find();
+    let name = object?.name;
     // Where this fails, the step stays.
     if (object && step.rows) await bringBack(run, object, step);
     else if (object) run.remove(object);
+    else if (run.drawn && !run.drawn.object) {
+      // It may be there once the service has answered.
+      name = `Object ${step.number + 1}`;
+      run.drawn = undefined;
+      await run.alone(async () => {
+        object = find();
+        if (object) run.remove(object);
+      });
+    }
     this.drop(step);
-    return object?.name;
+    return name;
   }
 
   /** @param {Step} step One that is undone, or whose box was refused. */

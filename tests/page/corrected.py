@@ -334,6 +334,57 @@ def added_over_a_slow_line(checks):
     page.context.close()
 
 
+def added_and_undone_at_once(checks):
+    """A new object that is undone while its session is opened does not come."""
+    page = checks.page()
+    paused_clip(page, checks.clips["card"]["truth"])
+    held = []
+    opening = "**/sessions/*?*box=*"
+    page.route(opening, lambda route: held.append(route))
+    page.locator("#add").click()
+    with page.expect_request(opening):
+        drag(page, OFF)
+    page.keyboard.press("Control+z")
+    # Time in which a page would be done that does not wait for the answer.
+    page.wait_for_timeout(500)
+    with page.expect_response(opening):
+        held[0].continue_()
+    said(page, "Object 2 is undone")
+    assert page.locator("#list li").count() == 1 and page.locator("#undo").is_disabled()
+    page.locator("#pause").click()
+    to_the_end(page)
+    table = rows(page)
+    assert len(table) == len(of_target(table, 0)) == 150, len(table)
+    page.context.close()
+
+
+def two_added_at_once(checks):
+    """While the session of a new object is opened, another box is not taken: each object comes, and undoing takes back
+    the newest one."""
+    page = checks.page()
+    paused_clip(page, checks.clips["card"]["truth"])
+    held = []
+    opening = "**/sessions/*?*box=*"
+    page.route(opening, lambda route: held.append(route))
+    page.locator("#add").click()
+    with page.expect_request(opening):
+        drag(page, OFF)
+    page.locator("#add").click()
+    drag(page, [400, 200, 60, 60])
+    said(page, "The box of the new object is on its way")
+    held[0].continue_()
+    page.locator("#list li:nth-child(2)").wait_for()
+    page.unroute(opening)
+    drag(page, [400, 200, 60, 60])
+    page.locator("#list li:nth-child(3)").wait_for()
+    for count in (2, 1):
+        page.locator("#undo").click()
+        said(page, f"Object {count + 1} is undone")
+        assert page.locator("#list li").count() == count
+    assert {row["target"] for row in rows(page)} == {"0"} and page.locator("#undo").is_disabled()
+    page.context.close()
+
+
 def box_at_the_edge(checks):
     """Arrows move a box to the edge of the picture and no further, and a paused run goes on after it."""
     page = checks.page(where="here")
@@ -409,6 +460,8 @@ ALL = [
     memory_of_steps,
     corrected_on_camera,
     added_over_a_slow_line,
+    added_and_undone_at_once,
+    two_added_at_once,
     box_at_the_edge,
     refused_box,
 ]
