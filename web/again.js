@@ -97,6 +97,7 @@ export async function trackBack(run, object, frame, { tell, signal }) {
     if (!isDone) added.forEach((number) => run.frames.forget(number));
   }
   if (!isDone) return 0;
+  run.tracked = run.frames.times.size;
   rows.forEach((row) => object.set(row));
   object.sort();
   return rows.length;

@@ -142,6 +142,7 @@ export class Editing {
       this.undoing.push(before);
       this.page.isUnsaved = true;
       this.page.say(done);
+      this.page.seen.figures(run);
       this.page.changed();
     } catch (error) {
       if (run === this.page.run) this.page.fail(error, () => this.tracksAgain(run, object, track));
@@ -173,6 +174,9 @@ export class Editing {
       const done = name ? `The last change to ${name} is undone.` : "There is nothing to undo.";
       this.page.say(done + (run.chosen ? "" : ` ${TAP}${DRAW}`));
       this.page.isUnsaved = true;
+      // It may be of those that were tracked backwards.
+      if (!run.frames.times.has(this.page.shown?.frame ?? 0)) this.page.leave();
+      this.page.seen.figures(run);
       this.page.repaint();
       this.page.changed();
     } catch (error) {

@@ -6,6 +6,7 @@
  * @property {Map<number, Row>} [rows] Nothing for an object that is added.
  * @property {TrackerState[]} saves
  * @property {number} last The last frame.
+ * @property {number} first The first frame.
  * @property {Follower} [follower] The session, where it learns nothing of the correction.
  * @property {FollowedObject} [deleted]
  */
@@ -25,7 +26,8 @@ export class Undoing {
    * @param {FollowedObject | undefined} object Nothing for one that is added. */
   before(run, object) {
     const { rows, saves = [], number = run.count, follower } = object ?? {};
-    return { number, rows: rows && new Map(rows), saves: [...saves], last: run.lastFrame, follower };
+    const [first] = run.frames.numbers;
+    return { number, rows: rows && new Map(rows), saves: [...saves], last: run.lastFrame, first, follower };
   }
 
   /** @param {Step} step */
@@ -43,8 +45,10 @@ export class Undoing {
     let object = find();
     let name = object?.name;
     // Where this fails, the step stays.
-    if (object && step.rows) await bringBack(run, object, step);
-    else if (object) run.remove(object);
+    if (object && step.rows) {
+      await bringBack(run, object, step);
+      forgetBefore(run, step.first);
+    } else if (object) run.remove(object);
     else if (run.drawn && !run.drawn.object) {
       // It may be there once the service has answered.
       name = `Object ${step.number + 1}`;
@@ -69,6 +73,17 @@ export class Undoing {
 function bytesIn(steps) {
   const states = new Set(steps.flatMap(({ saves }) => saves));
   return [...states].reduce((sum, { bytes }) => sum + bytes.length, 0);
+}
+
+/** Gives up frames that were tracked backwards, where no object has a row any more.
+ * @param {Run} run
+ * @param {number} first */
+function forgetBefore(run, first) {
+  const { frames, objects } = run;
+  for (const number of frames.numbers) {
+    if (number < first && !objects.some(({ rows }) => rows.has(number))) frames.forget(number);
+  }
+  run.tracked = frames.times.size;
 }
 
 /**

@@ -219,6 +219,18 @@ def tracked_backwards(checks):
     close = near(table[:KEY], truth)
     print(f"  {close} of {KEY} frames within 10 px, backwards")
     assert close >= 0.9 * KEY
+    assert page.locator("#frames").inner_text() == str(len(table))
+    page.locator("#timeline").focus()
+    page.keyboard.press("Home")
+    shown(page, 0)
+    page.locator("#undo").click()
+    said(page, "is undone")
+    # The last one is shown: the one that was is gone.
+    shown(page, KEY + len(before) - 1)
+    assert page.locator("#frames").inner_text() == str(len(before)) and values(rows(page)) == values(before)
+    page.locator("#timeline").focus()
+    page.keyboard.press("Home")
+    shown(page, KEY)
     page.context.close()
 
 
