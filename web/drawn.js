@@ -6,6 +6,7 @@ import { Problem } from "./js/problem.js";
  * @typedef {object} Drawn A box until it is answered.
  * @property {Box} box
  * @property {FollowedObject | undefined} object Nothing for a new one.
+ * @property {() => void} sending Notes what is there before it, once the frames on their way are answered.
  * @property {() => void} refused Takes back what was noted of it.
  * @property {boolean} [isSent]
  */
@@ -16,6 +17,7 @@ export async function sendDrawn(run) {
   const { drawn, picture } = run;
   if (!drawn || run.isRedoing || run.underWay.length > 0) return run.throttle();
   const { box, object } = drawn;
+  drawn.sending();
   const sent = { picture, at: performance.now() };
   run.underWay.push(sent);
   let isLeft = false;

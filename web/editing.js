@@ -89,9 +89,10 @@ export class Editing {
     run.pause(this.page.state === "paused");
     if (this.page.viewed || run.isResting) return void this.trackOn(run, object, (this.page.viewed ?? run.picture).frame, box);
     // Its session learns of the box.
-    const step = { ...this.undoing.before(run, object), follower: undefined };
+    const before = () => ({ ...this.undoing.before(run, object), follower: undefined });
+    const step = before();
     this.undoing.push(step);
-    run.draw(box, object, () => this.undoing.drop(step));
+    run.draw(box, object, () => Object.assign(step, before()), () => this.undoing.drop(step));
     this.page.say(object ? "The box is corrected." : "Following another object.");
   }
 

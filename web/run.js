@@ -220,9 +220,10 @@ export class Run {
   /** The user drew a box in the picture that is shown: for an object, or for a new one.
    * @param {Box} box
    * @param {FollowedObject | undefined} object
+   * @param {() => void} sending Is told as it is sent.
    * @param {() => void} refused Is told where the tracker does not take it. */
-  draw(box, object, refused) {
-    this.drawn = { box, object, refused };
+  draw(box, object, sending, refused) {
+    this.drawn = { box, object, sending, refused };
     sendDrawn(this);
   }
 

@@ -1,6 +1,7 @@
 """Corrections: what is there stays until the new rows are, up to the next correction, and comes back when undone."""
 
 import json
+import signal
 
 from browser import (
     DRAW,
@@ -130,6 +131,28 @@ def undone_while_it_is_followed(checks):
         assert len(table) == 150 and values(table[: len(before)]) == values(before)
         assert abs(numbers(table[-1])[0] - last[0]) < 15 and abs(numbers(table[-1])[1] - last[1]) < 15, (table[-1], last)
         page.context.close()
+
+
+def undone_with_frames_on_their_way(checks):
+    """A box that is drawn while earlier frames are on their way corrects the last of them: undoing takes it back there."""
+    service = Service(checks.program)
+    page = checks.page(url=service.url, where="there")
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 20)
+    service.process.send_signal(signal.SIGSTOP)
+    page.locator("#pause").click()
+    drag(page, OFF)
+    said(page, "The box is corrected")
+    service.process.send_signal(signal.SIGCONT)
+    before = rows_when(page, is_off)
+    page.keyboard.press("Control+z")
+    said(page, "is undone")
+    after = rows(page)
+    assert len(after) == len(before) and values(after[:-1]) == values(before[:-1])
+    assert abs(numbers(after[-1])[0] - numbers(after[-2])[0]) < 15, (after[-2:], before[-1])
+    page.context.close()
+    service.stop()
 
 
 def undone_after_more_frames(checks):
@@ -452,6 +475,7 @@ ALL = [
     tracked_anew_and_cancelled,
     up_to_the_next_correction,
     undone_while_it_is_followed,
+    undone_with_frames_on_their_way,
     undone_after_more_frames,
     deletion_undone,
     no_object_left,
