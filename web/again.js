@@ -166,7 +166,7 @@ async function goOn(run, source) {
       });
       if (isGone()) object.follower.end();
     }
-    await source.goTo?.(run.picture.time, run.picture.frame);
+    if (!run.isOver) await source.goTo?.(run.picture.time, run.picture.frame);
   });
   if (!run.isOver && !run.isResting) run.play();
 }

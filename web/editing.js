@@ -221,7 +221,7 @@ export class Editing {
     if (isOn && run.objects.length >= MOST_OBJECTS) return this.page.say(`No more than ${MOST_OBJECTS} objects are followed.`);
     this.add(isOn);
     this.drawing.arm(isOn);
-    this.page.say(isOn ? ADD : "No object is added.");
+    this.page.say(isOn ? ADD : "Adding is given up.");
   }
 
   makeList() {

@@ -97,7 +97,7 @@ export class LocalFollower {
     return this.own.snapshot();
   }
 
-  bag() {
+  async bag() {
     return this.own.bag();
   }
 
@@ -239,7 +239,7 @@ export class ServiceFollower {
     return taken.then(async (response) => new Uint8Array(await response.arrayBuffer()));
   }
 
-  bag() {
+  async bag() {
     return this.own.bag();
   }
 

@@ -60,9 +60,11 @@ addEventListener("click", ({ target }) => {
   const sources = /** @type {HTMLDetailsElement} */ (get("sources"));
   if (page.run && target instanceof Node && !sources.contains(target)) sources.open = false;
 });
-get("sources").addEventListener("keydown", ({ key }) => {
+get("sources").addEventListener("keydown", (event) => {
   const sources = /** @type {HTMLDetailsElement} */ (get("sources"));
-  if (!page.run || key !== "Escape") return;
+  if (!page.run || event.key !== "Escape") return;
+  // It is for nothing else.
+  event.preventDefault();
   sources.open = false;
   sources.querySelector("summary")?.focus();
 });

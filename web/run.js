@@ -160,8 +160,10 @@ export class Run {
       if (this.isResting && answers.some((answer) => !answer)) return close(picture);
       // Those on their way when the last object is deleted are before the next box.
       const isSkipped = objects.length > 0 && !this.wantsObject && answers.every((answer) => !answer);
-      if (isSkipped) this.skip(picture);
-      else this.answered(objects, answers, sent);
+      if (isSkipped) {
+        this.skip(picture);
+        sendDrawn(this);
+      } else this.answered(objects, answers, sent);
     } catch (error) {
       this.underWay = this.underWay.filter((other) => other !== sent);
       this.fail(error);

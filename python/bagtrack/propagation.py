@@ -42,9 +42,9 @@ def propagate(
     after the other. `boxes` is one box or several; the trackers are those of `bagtrack track` with the same seed.
 
     At most `count` frames are tracked after the first one; `backwards` goes from `start` to frame 0, through a file, a
-    folder or a sequence. With `until_lost` a target's last answer is the one in which it is lost, and the frames end with the last
-    target. With `keyframes` only those answers are given, at the end, between which linear interpolation gives every
-    edge of every box to within a pixel, or to within as many as it says.
+    folder or a sequence. With `until_lost` a target's last answer is the one in which it is lost, and the frames end
+    with the last target. With `keyframes` only those answers are given, at the end, between which linear interpolation
+    gives every edge of every box to within a pixel, or to within as many as it says.
 
     `ValueError` where a frame or a box cannot be used, or where there is no frame `start`.
     """
@@ -54,7 +54,7 @@ def propagate(
     if start < 0 or (count is not None and count < 0):
         raise ValueError("start and count are 0 or more")
     if backwards and start == 0:
-        raise ValueError("to go backwards give start, the frame of the boxes")
+        raise ValueError("to go backwards give start, the frame of the boxes, from 1 on")
     targets = np.atleast_2d(given)
     tracker = Tracker(preset, seed, **params)
     trackers = [tracker.of_target(target) for target in range(len(targets))]

@@ -269,7 +269,7 @@ def box_of_another_source(checks):
 
 
 def box_left_by_the_keyboard(checks):
-    """A box that the keyboard has begun is given up with Escape, and where the focus goes elsewhere: the run goes on."""
+    """A box that the keyboard has begun is given up with Escape, and where the focus goes elsewhere: it goes on."""
     page = checks.page(where="here")
     # It waits for this frame: it cannot have ended.
     page.route("**/sample/card/140.jpg", lambda route: None)
@@ -282,7 +282,7 @@ def box_left_by_the_keyboard(checks):
     page.locator("#pause").click()
     page.locator("body[data-state=paused]").wait_for()
     page.locator("#pause").click()
-    frames(page, before + 20)
+    frames(page, before + 1)
     page.keyboard.press("Space")
     page.locator("body[data-state=paused]").wait_for(timeout=20_000)
     page.locator("#picture").focus()
@@ -295,8 +295,8 @@ def box_left_by_the_keyboard(checks):
 
 
 def adding_given_up(checks):
-    """"Add an object" pressed again, and Escape, give up to draw one; where there is none, each button that saves says so.
-    Space that is held pauses once."""
+    """"Add an object" pressed again, and Escape, give up to draw one. Where there is none, each button that saves says
+    so. Space that is held pauses once."""
     page = checks.page(where="here")
     # It waits for this frame: it cannot have ended.
     page.route("**/sample/card/140.jpg", lambda route: None)
@@ -313,7 +313,7 @@ def adding_given_up(checks):
         again()
         page.locator("#add[aria-pressed=false]").wait_for(timeout=20_000)
         page.locator("#draw[aria-pressed=false]").wait_for(state="attached", timeout=20_000)
-        said(page, "No object is added")
+        said(page, "Adding is given up")
     page.get_by_label("Delete Object 1").click()
     for name in ("project", "csv", "video"):
         say_nothing(page)

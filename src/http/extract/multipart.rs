@@ -130,7 +130,10 @@ pub(super) async fn read<S: Settings>(
             }
             fields.texts.add(&name, &String::from_utf8_lossy(&text))?;
         } else if fields.files.len() < max_files {
-            fields.media_type = part.content_type().map(str::to_lowercase);
+            // Beside other files, a video's is the one that tells.
+            let told = fields.media_type.take();
+            let told = told.filter(|kind| kind.starts_with("video/"));
+            fields.media_type = told.or(part.content_type().map(str::to_lowercase));
             let file = read_part(part, &progress, max_bytes, max_bytes, charge).await?;
             fields.files.push(file);
         } else {

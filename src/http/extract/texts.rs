@@ -53,7 +53,7 @@ impl Texts {
         match self.0.insert(name.to_owned(), text.into()) {
             None => Ok(()),
             Some(_) => Err(Problem::malformed(format!(
-                "`{name}` is given twice; give it once (a box is `x,y,width,height` in one)."
+                "`{name}` is given twice; give it once, in one value (`box=x,y,width,height`)."
             ))),
         }
     }

@@ -83,9 +83,7 @@ fn not_identified(headers: &HeaderMap) -> Problem {
         Some(text) if text.contains(':') => {
             "The key is not known here. Of a line `name:key` of the service's keys, send the part after the colon."
         }
-        Some(_) => {
-            "The key is not known here. Where there is a `--metrics-key`, the metrics take it alone."
-        }
+        Some(_) => "The key is not known here (`/metrics` may have its own, `--metrics-key`).",
         None if headers.contains_key(AUTHORIZATION) => {
             "The header must be `Authorization: Bearer …`, once, with an API key or a session token."
         }

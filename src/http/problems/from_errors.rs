@@ -265,7 +265,7 @@ impl From<FramesError> for Problem {
 }
 
 impl Problem {
-    /// The client has so many sessions as it may.
+    /// The client has as many sessions as it may.
     fn no_more_sessions(most: &str) -> Self {
         let detail = format!(
             "One client may have {most}. Delete sessions that are done, or try again after the time in `Retry-After`."

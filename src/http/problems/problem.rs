@@ -289,8 +289,8 @@ fixed! {
         "Start the service with the origin of the page in --cors-origins (BAGTRACK_CORS_ORIGINS).";
     host_not_allowed: HostNotAllowed "Start the service with this host in --allowed-hosts (BAGTRACK_ALLOWED_HOSTS).";
     session_not_found: SessionNotFound
-        "No session of yours has this id (a UUID) here: it was never opened with this key, was deleted, or the service was \
-            started again without a store. Open a new one with POST /sessions.";
+        "No session of yours has this id (a UUID) here: it was never opened with this key, was deleted, or the service \
+            was started again without a store. Open a new one with POST /sessions.";
     session_expired: SessionExpired
         "No frame came in time; `expires_at` tells how long a session waits. Open a new one with POST /sessions.";
     idempotency_key_reused: IdempotencyKeyReused

@@ -129,11 +129,13 @@ async fn what_is_wrong_with_the_video_or_the_box_is_told() {
 #[ignore = "needs ffmpeg"]
 async fn motion_jpeg_in_a_form_has_its_type_at_its_part() {
     let app = TestApplication::start().await;
-    let part = Part::bytes(motion_jpeg()).mime_str("video/x-motion-jpeg");
-    let request = app.request(Method::POST, "/track", &[("box", FIRST)]);
-    let form = Form::new().part("frame", part.unwrap());
-    let answer = request.multipart(form).send().await.unwrap();
-    assert_eq!(lines(answer).await.len(), FRAMES as usize);
+    for media_type in ["video/x-motion-jpeg", "Video/X-Motion-JPEG; charset=binary"] {
+        let part = Part::bytes(motion_jpeg()).mime_str(media_type);
+        let request = app.request(Method::POST, "/track", &[("box", FIRST)]);
+        let form = Form::new().part("frame", part.unwrap());
+        let answer = request.multipart(form).send().await.unwrap();
+        assert_eq!(lines(answer).await.len(), FRAMES as usize, "{media_type}");
+    }
 }
 
 /// Frames before the start counted as those that are tracked, so that the end of a long video was out of reach.

@@ -484,7 +484,7 @@ async fn frames_before_damage(app: &TestApplication, video: &[u8]) -> usize {
     got.len()
 }
 
-/// ffmpeg looks seconds ahead for the kind of the sound, and told the damage before the first picture: there was no row.
+/// ffmpeg looks seconds ahead for the kind of the sound, and told the damage before the first picture: no row came.
 /// Without sound the damage was told some pictures early, at another one each time.
 #[tokio::test]
 #[ignore = "needs ffmpeg"]

@@ -256,7 +256,7 @@ impl VideoDecoder {
         if let Some(saying) = saying {
             self.said.catch_up(saying);
         }
-        // Where the program goes on after it, the pictures have unknown numbers.
+        // Where the program goes on after damage, pictures have unknown numbers.
         if let Some(fault) = self.said.fault() {
             return Err(self.error(fault));
         }

@@ -40,7 +40,7 @@ struct Heard {
     fault: Option<Fault>,
     /// One that holds for the end of the video alone.
     fault_at_end: Option<Fault>,
-    /// Whether that is the damage at which the program is about to end.
+    /// Whether that is damage, at which the program should end.
     is_damaged: bool,
     /// Whether the last line was of a codec that may not be read.
     is_unlisted: bool,

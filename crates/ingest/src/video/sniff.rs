@@ -24,7 +24,8 @@ pub fn video_format(bytes: &[u8], media_type: &str) -> Option<VideoFormat> {
     let is_container = is_boxed && type_name(bytes).is_none()
         || bytes.starts_with(b"\x1A\x45\xDF\xA3")
         || bytes.starts_with(b"GIF8");
-    let is_motion = matches!(media_type, "video/x-motion-jpeg" | "video/x-mjpeg");
+    let essence = media_type.split(';').next().unwrap_or("").trim();
+    let is_motion = matches!(essence, "video/x-motion-jpeg" | "video/x-mjpeg");
     match (is_container, is_motion && bytes.starts_with(b"\xFF\xD8")) {
         (true, _) => Some(VideoFormat::Container),
         (_, true) => Some(VideoFormat::MotionJpeg),
