@@ -325,7 +325,7 @@ CAMERA = """async () => {
     const told = { answer: nothing, fail: nothing, rest: nothing, refuse: nothing, line: nothing, anew: nothing };
     const run = new Run(client, source, picture(0), told);
     await run.begin(box);
-    run.draw(box, run.chosen);
+    run.draw(box, run.chosen, nothing, nothing);
     [1, 2].forEach((frame) => deliver(picture(frame)));
     const boxes = sent.map(({ header }) => header.box !== undefined);
     sent.forEach(({ answer }, frame) => answer({ frame, box, score: 1, status: "tracking" }));
