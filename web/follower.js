@@ -93,7 +93,7 @@ export class LocalFollower {
     return box ? this.own.correct(picture.image, box) : this.batch.track(this.own, picture, see);
   }
 
-  save() {
+  async save() {
     return this.own.snapshot();
   }
 
@@ -234,9 +234,9 @@ export class ServiceFollower {
   }
 
   /** Of now: frames on their way may be in it. */
-  save() {
-    const taken = this.own.call("GET", "/snapshot");
-    return taken.then(async (response) => new Uint8Array(await response.arrayBuffer()));
+  async save() {
+    const taken = await this.own.call("GET", "/snapshot");
+    return new Uint8Array(await taken.arrayBuffer());
   }
 
   async bag() {

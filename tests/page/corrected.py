@@ -361,20 +361,28 @@ def added_over_a_slow_line(checks):
     page.context.close()
 
 
-def added_and_undone_at_once(checks):
-    """A new object that is undone while its session is opened does not come."""
+OPENING = "**/sessions/*?*box=*"
+
+
+def added_to_a_paused_clip(checks):
+    """A page with a new object whose session is not opened yet, and a list with the request that opens it."""
     page = checks.page()
     paused_clip(page, checks.clips["card"]["truth"])
     held = []
-    opening = "**/sessions/*?*box=*"
-    page.route(opening, lambda route: held.append(route))
+    page.route(OPENING, lambda route: held.append(route))
     page.locator("#add").click()
-    with page.expect_request(opening):
+    with page.expect_request(OPENING):
         drag(page, OFF)
+    return page, held
+
+
+def added_and_undone_at_once(checks):
+    """A new object that is undone while its session is opened does not come."""
+    page, held = added_to_a_paused_clip(checks)
     page.keyboard.press("Control+z")
     # Time in which a page would be done that does not wait for the answer.
     page.wait_for_timeout(500)
-    with page.expect_response(opening):
+    with page.expect_response(OPENING):
         held[0].continue_()
     said(page, "Object 2 is undone")
     assert page.locator("#list li").count() == 1 and page.locator("#undo").is_disabled()
@@ -388,20 +396,13 @@ def added_and_undone_at_once(checks):
 def two_added_at_once(checks):
     """While the session of a new object is opened, another box is not taken: each object comes, and undoing takes back
     the newest one."""
-    page = checks.page()
-    paused_clip(page, checks.clips["card"]["truth"])
-    held = []
-    opening = "**/sessions/*?*box=*"
-    page.route(opening, lambda route: held.append(route))
-    page.locator("#add").click()
-    with page.expect_request(opening):
-        drag(page, OFF)
+    page, held = added_to_a_paused_clip(checks)
     page.locator("#add").click()
     drag(page, [400, 200, 60, 60])
     said(page, "The box of the new object is on its way")
     held[0].continue_()
     page.locator("#list li:nth-child(2)").wait_for()
-    page.unroute(opening)
+    page.unroute(OPENING)
     drag(page, [400, 200, 60, 60])
     page.locator("#list li:nth-child(3)").wait_for()
     for count in (2, 1):
