@@ -1,4 +1,5 @@
-//! Files under another name than `frame`, which is the likeliest mistake of all, and settings in the wrong place.
+//! Files under another name than `frame`, which is the likeliest mistake of all, boxes under another name than `box`, and
+//! settings in the wrong place.
 
 use crate::http::problems::problem::Problem;
 use bagtrack_api::ProblemKind as Kind;
@@ -11,6 +12,11 @@ use serde_json::{Value, json};
 const FILE_NAMES: [&str; 16] = [
     "data", "file", "files", "frame", "frames", "image", "images", "img", "imgs", "media", "photo",
     "photos", "picture", "pictures", "upload", "video",
+];
+
+/// What boxes and their sides are called elsewhere.
+const BOX_NAMES: [&str; 12] = [
+    "bbox", "h", "height", "left", "rect", "region", "roi", "top", "w", "width", "x", "y",
 ];
 
 fn is_name_of_file(name: &str) -> bool {
@@ -57,12 +63,33 @@ pub(super) fn field<S: Settings>(name: &str, value: &str) -> Option<Problem> {
     })
 }
 
-/// The problem of a parameter of the tracker that is given as a setting.
-pub(super) fn parameter<S: Settings>(name: &str, text: &str) -> Option<Problem> {
-    let is_parameter = Params::TABLE.iter().any(|row| row.name == name);
-    if !is_parameter || is_setting::<S>(name) {
+/// The problem of a setting that is called so and has this value, if it is known what was meant.
+pub(super) fn setting<S: Settings>(name: &str, text: &str) -> Option<Problem> {
+    if is_setting::<S>(name) {
         return None;
     }
+    parameter::<S>(name, text).or_else(|| rect::<S>(name))
+}
+
+/// The problem of a box that is called so, or that is given where none is taken.
+fn rect<S: Settings>(name: &str) -> Option<Problem> {
+    let detail = match is_setting::<S>("box") {
+        true if BOX_NAMES.contains(&&*name.to_ascii_lowercase()) => {
+            format!("There is no setting `{name}`. A box is one setting: `box=x,y,width,height`.")
+        }
+        false if matches!(name, "box" | "boxes") => {
+            "No box is taken here: `POST /sessions` takes that of the first \
+            frame, and `PUT /sessions/{id}/target` a corrected one with a later frame."
+                .to_owned()
+        }
+        _ => return None,
+    };
+    Some(Problem::malformed(detail))
+}
+
+/// The problem of a parameter of the tracker that is given as a setting.
+fn parameter<S: Settings>(name: &str, text: &str) -> Option<Problem> {
+    Params::TABLE.iter().find(|row| row.name == name)?;
     let value = serde_json::from_str::<Value>(text).unwrap_or_else(|_| text.into());
     let detail = match is_setting::<S>("parameters") {
         true => format!(

@@ -72,7 +72,7 @@ impl Texts {
     /// One is unknown, or its text is no value of its type.
     pub fn parse<S: Settings>(self) -> Result<S, Problem> {
         let misplaced = self.0.iter().find_map(|(name, text)| {
-            misnamed::parameter::<S>(name, text.as_str().unwrap_or_default())
+            misnamed::setting::<S>(name, text.as_str().unwrap_or_default())
         });
         match misplaced {
             Some(problem) => Err(problem),

@@ -26,7 +26,7 @@ pub async fn answer_problems(
     let document = Json(instance.count(state, problem)).into_response();
     let retry_after = problem.retry_seconds();
     *response.body_mut() = document.into_body();
-    // The response's own headers stay: it may have some that the problem does not know, like `Allow`.
+    // The response's own headers stay: it may have some that the problem does not know, like `Connection`.
     let headers = response.headers_mut();
     headers.remove(CONTENT_LENGTH);
     headers.insert(CONTENT_TYPE, HeaderValue::from_static(PROBLEM));

@@ -11,6 +11,7 @@ use bagtrack_sessions::{
 };
 use bagtrack_tracker::TrackerError;
 use std::sync::Arc;
+use std::time::Duration;
 
 impl From<ReplayError> for Problem {
     fn from(error: ReplayError) -> Self {
@@ -270,7 +271,10 @@ impl Problem {
         let detail = format!(
             "One client may have {most}. Delete sessions that are done, or try again after the time in `Retry-After`."
         );
-        Self::new(Kind::QuotaExceeded, detail).with_effect(Effect::NothingChanged)
+        // A session stays for longer than a request or a frame.
+        Self::new(Kind::QuotaExceeded, detail)
+            .with_effect(Effect::NothingChanged)
+            .retry_after(Duration::from_secs(10))
     }
 }
 

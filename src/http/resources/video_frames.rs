@@ -51,7 +51,8 @@ pub async fn post(
     mut request: StatelessRequest<DecodeSettings>,
 ) -> Result<Response, Problem> {
     let Some(format) = request.upload.video else {
-        let detail = "Send a video: MP4, WebM, GIF or Motion JPEG. `ffmpeg -i VIDEO clip.mp4` makes one of others.";
+        let detail = "This path gives the frames of a video: MP4, WebM, GIF or Motion JPEG. `ffmpeg -i VIDEO clip.mp4` \
+            makes one of others. A frame is posted to a session: `POST /sessions/{id}/frames`.";
         return Err(Problem::new(Kind::UnsupportedImage, detail));
     };
     let file = request.upload.files.swap_remove(0);

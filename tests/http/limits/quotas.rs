@@ -30,6 +30,7 @@ async fn one_client_cannot_take_all_sessions() {
     let refused = app.create_as("198.51.100.1").await;
     let policy = refused.headers()["ratelimit-policy"].to_str().unwrap();
     assert!(policy.contains("\"sessions\";q=2"), "{policy}");
+    assert_eq!(refused.headers()["retry-after"], "10");
     let parts = ["2 sessions", "Delete sessions that are done"];
     expect_detail(refused, "quota-exceeded", &parts).await;
     expect(app.create_as("198.51.100.2").await, StatusCode::CREATED).await;

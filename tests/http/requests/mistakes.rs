@@ -39,6 +39,33 @@ async fn a_file_under_another_name_is_told_to_be_called_frame() {
     assert_eq!(opened.status(), StatusCode::CREATED);
 }
 
+#[tokio::test]
+async fn a_box_under_another_name_or_in_another_place_is_led_to_its_own() {
+    let (app, id) = TestApplication::with_session().await;
+    let frames = format!("/sessions/{id}/frames");
+    for (path, name, texts) in [
+        ("/sessions", "bbox", ["`bbox`", "`box=x,y,width,height`"]),
+        ("/track", "x", ["`x`", "`box=x,y,width,height`"]),
+        (
+            &frames,
+            "box",
+            ["POST /sessions", "PUT /sessions/{id}/target"],
+        ),
+        (
+            &frames,
+            "boxes",
+            ["POST /sessions", "PUT /sessions/{id}/target"],
+        ),
+    ] {
+        let frame = Part::bytes(pictures::png(1)).file_name("frame.png");
+        let form = Form::new().part("frame", frame).text(name, BOX);
+        let request = app.request(Method::POST, path, &[]).multipart(form);
+        let refused = request.send().await.unwrap();
+        expect_detail(refused, "malformed-request", &texts).await;
+    }
+    assert_eq!(app.frames_of(&id).await, 1);
+}
+
 /// The first bytes of files as phones make them.
 const HEIC: &[u8] = b"\0\0\0\x24ftypheic\0\0\0\0mif1MiHEMiPrmiafMiHBheic\0\0\x0d\x5bmeta\0\0\0\0";
 const AVIF: &[u8] = b"\0\0\0\x20ftypavif\0\0\0\0avifmif1miafMA1B\0\0\0\xf2meta\0\0\0\0";

@@ -118,7 +118,7 @@ async fn a_video_comes_back_frame_by_frame() {
     }
     let request = app.request(Method::POST, "/frames", &[]);
     let refused = request.body(pictures::png(1)).send().await.unwrap();
-    expect_detail(refused, "unsupported-image", &["Send a video"]).await;
+    expect_detail(refused, "unsupported-image", &["frames of a video"]).await;
     let request = app.request(Method::POST, "/frames", &[]);
     expect_problem(
         request.body(empty_mp4()).send().await.unwrap(),
