@@ -3,29 +3,76 @@
 use std::hint::black_box;
 
 use bagtrack_sample::{Clip, Scene, Settings};
-use bagtrack_tracker::{AffineSubspace, Frame, Preset, Rect, Status, Tracker, patch};
+use bagtrack_tracker::{AffineSubspace, Frame, Params, Preset, Rect, Status, Tracker, patch};
 use nalgebra::DMatrix;
 
 use crate::{clock, scene, textbook, warm};
 
 const ROUNDS: usize = 300;
 
+/// Median seconds of each, measured in turns.
+struct Times {
+    step: f64,
+    robust_step: f64,
+    /// Of the arithmetic of `paper`.
+    evaluation: f64,
+    /// Of the same, as a textbook has it.
+    textbook: f64,
+    /// Of one matrix product of the sizes in `shape`.
+    product: f64,
+    /// Its columns, the length of a vector, and its rows.
+    shape: [usize; 3],
+}
+
 pub fn print() {
-    let params = Preset::Paper.params();
-    let look = |t: usize, shift: f64| {
-        let area = scene::target(t);
-        let moved = Rect::new(
-            area.x + shift,
-            area.y - shift / 2.0,
-            area.width,
-            area.height,
-        );
-        patch(&scene::frame(t), &moved, &params)
+    let Times {
+        step,
+        robust_step,
+        evaluation,
+        textbook,
+        product,
+        shape: [columns, len, rows],
+    } = measure();
+    println!("median of {ROUNDS} rounds, in turns, processor time of one thread\n");
+    println!("| what | µs | |");
+    println!("|---|---|---|");
+    let line = |what: &str, seconds: f64, note: String| {
+        println!("| {what} | {:.0} | {note} |", seconds * 1e6);
     };
-    let looks: Vec<Vec<f32>> = (0..55).map(|t| look(t, (t % 7) as f64 * 0.3)).collect();
+    line("`Tracker::step`, `paper`", step, String::new());
+    line("`Tracker::step`, `robust`", robust_step, String::new());
+    let (lost, note) = out_of_sight(robust_step);
+    line(
+        "the same while the target is out of sight, in a clip of `sample`",
+        lost,
+        note,
+    );
+    let note = format!("{:.1} × the product", evaluation / product);
+    line(
+        "the arithmetic of `paper`: feature vectors to weights",
+        evaluation,
+        note,
+    );
+    let what = format!(
+        "one bare product by nalgebra, {columns} × {len} by {len} × {rows}, f64 as in the step"
+    );
+    line(&what, product, String::new());
+    let note = format!(
+        "{:.0} × the arithmetic, {:.0} × the whole step",
+        textbook / evaluation,
+        textbook / step
+    );
+    line("the textbook version of the same", textbook, note);
+}
+
+fn measure() -> Times {
+    let params = Preset::Paper.params();
+    let looks: Vec<Vec<f32>> = (0..55)
+        .map(|t| look(t, (t % 7) as f64 * 0.3, &params))
+        .collect();
     let looks: Vec<&[f32]> = looks.iter().map(Vec::as_slice).collect();
     let candidates: Vec<Vec<f32>> = (0..params.particles)
-        .map(|i| look(61, f64::from(i) / 5.0 - 10.0))
+        .map(|i| look(61, f64::from(i) / 5.0 - 10.0, &params))
         .collect();
     let bag: Vec<AffineSubspace> = looks[..50]
         .chunks(5)
@@ -71,36 +118,22 @@ pub fn print() {
             black_box(textbook::evaluate(&candidates, history, &bag, &params));
         })],
     )[0];
-    println!("median of {ROUNDS} rounds, in turns, processor time of one thread\n");
-    println!("| what | µs | |");
-    println!("|---|---|---|");
-    let line = |what: &str, seconds: f64, note: String| {
-        println!("| {what} | {:.0} | {note} |", seconds * 1e6);
-    };
-    line("`Tracker::step`, `paper`", step, String::new());
-    line("`Tracker::step`, `robust`", robust_step, String::new());
-    let (lost, note) = out_of_sight(robust_step);
-    line(
-        "the same while the target is out of sight, in a clip of `sample`",
-        lost,
-        note,
-    );
-    let note = format!("{:.1} × the product", evaluation / product);
-    line(
-        "the arithmetic of `paper`: feature vectors to weights",
+    Times {
+        step,
+        robust_step,
         evaluation,
-        note,
-    );
-    let what = format!(
-        "one bare product by nalgebra, {columns} × {len} by {len} × {rows}, f64 as in the step"
-    );
-    line(&what, product, String::new());
-    let note = format!(
-        "{:.0} × the arithmetic, {:.0} × the whole step",
-        textbook / evaluation,
-        textbook / step
-    );
-    line("the textbook version of the same", textbook, note);
+        textbook,
+        product,
+        shape: [columns, len, rows],
+    }
+}
+
+/// The feature vector of frame `t` of the scene where the target is, moved by `shift` to the right and half of it up.
+fn look(t: usize, shift: f64, params: &Params) -> Vec<f32> {
+    let area = scene::target(t);
+    let (x, y) = (area.x + shift, area.y - shift / 2.0);
+    let moved = Rect::new(x, y, area.width, area.height);
+    patch(&scene::frame(t), &moved, params)
 }
 
 /// Seconds of a step of `robust` while the target is out of sight, in a drawn clip; and the ratio. Timed

@@ -184,6 +184,10 @@ fn endless_lossy() -> Vec<u8> {
 }
 
 #[test]
+#[expect(
+    clippy::too_many_lines,
+    reason = "a list of files, each with its bound"
+)]
 fn no_format_allocates_more_than_is_promised() {
     let limits = Limits {
         max_memory: 32 << 20,

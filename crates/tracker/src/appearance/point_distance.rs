@@ -183,6 +183,10 @@ mod tests {
 
     /// Against the printed equations with one column, on vectors whitened by an eigendecomposition of the covariance.
     #[test]
+    #[expect(
+        clippy::too_many_lines,
+        reason = "the equations of the paper, in their order"
+    )]
     fn distances_are_those_of_the_printed_equations_with_one_column() {
         for background_samples in [0, 9, 30] {
             let params = Params {

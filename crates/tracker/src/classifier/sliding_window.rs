@@ -128,6 +128,7 @@ mod tests {
 
     /// Each score from the vector of its window, written out.
     #[test]
+    #[expect(clippy::too_many_lines, reason = "one definition, written out")]
     fn scores_are_those_of_the_unit_vectors_of_windows() {
         for (width, height) in [(8, 8), (5, 7)] {
             let params = Params {
