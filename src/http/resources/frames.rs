@@ -19,13 +19,15 @@ type FramesJson = JsonBody<FramesSettings>;
 
 /// Send the next frame, or several
 ///
-/// The answer is that to the last frame. Where several were sent, in order, `answers` has one for each of them. All
-/// frames of a request are decoded before the first is tracked: if one is bad, none is taken. In a session that was
-/// opened with `boxes` an answer has an array `targets`, in the order of the boxes, and its own box is the first's.
+/// The answer is that to the last frame. Where several were sent, in order, `answers` has one for each of them. The
+/// headers of all files are checked before the first is decoded, and if one frame is bad, none is taken. In a session
+/// that was opened with `boxes` an answer has an array `targets`, in the order of the boxes, and its own box is the
+/// first's.
 ///
 /// Numbered frames can be sent again: `?frame=N` says that the (first) frame of this request is frame N. The next
-/// number is processed, one that comes a little early waits for its turn, and those of the last 32 frames, or of the
-/// last request, with the same bytes get the stored answers again, with the header `Replayed: true`.
+/// number is processed. One that is up to 16 ahead of it waits for its turn, at most two seconds. Those of the last 32
+/// frames, or of the last request, with the same bytes get the stored answers again, with the header `Replayed: true`.
+/// All others answer `frame-out-of-order`, and a known number with other bytes `frame-differs`.
 ///
 /// With `Accept: application/x-ndjson` each frame is answered by a line of JSON as soon as it is tracked. Frames before
 /// one that is refused count then; its problem document is the last line. So is a video answered, where the service has
