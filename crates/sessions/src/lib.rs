@@ -1,7 +1,7 @@
 //! The live sessions: a map of them, and what keeps them apart.
 //!
-//! In: a [`SessionState`], which is a tracker for each target and the answers to the last request. Out: a [`Session`] in the
-//! [`Registry`], found by its id.
+//! In: a [`SessionState`], which is a tracker for each target and the answers to the last frames: [`KEPT_ANSWERS`] of
+//! them, or all of the last request where these are more. Out: a [`Session`] in the [`Registry`], found by its id.
 //!
 //! [`SessionService`] is the one door. A request for a session takes these steps: [`SessionService::find`] finds it for
 //! its owner, [`Session::enter`] takes one of its few permits, [`Charge::grow`] charges the bytes of its body as they

@@ -70,7 +70,7 @@ pub enum ReplayDecision {
 /// The frame number does not fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ReplayError {
-    /// Neither the next frame nor the last one.
+    /// Neither the next frame nor one whose answer is stored.
     #[error("frame {got} is out of order; the next frame is {expected}")]
     OutOfOrder {
         /// The number sent.
@@ -78,7 +78,7 @@ pub enum ReplayError {
         /// The number of the next frame.
         expected: u64,
     },
-    /// The number of the last frame, with other bytes (or another box).
+    /// The number of a frame whose answer is stored, with other bytes (or another box).
     #[error(
         "frame {got} was answered for other bytes or another box; the next frame is {expected}"
     )]

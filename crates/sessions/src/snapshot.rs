@@ -1,11 +1,11 @@
-//! A session as bytes: the tracker's snapshot and the answers to the last request.
+//! A session as bytes: the trackers' snapshots and the answers to the last frames.
 //!
 //! Layout: [`MAGIC`], one version byte, the compressed content, and the code of all of these under a key of the service
 //! ([`MacKeys`]). The content is, in postcard's encoding: the trackers' snapshots, then the list of stored answers,
 //! each a digest and what was answered for each target. Where the session was opened with a list of boxes, the version
 //! is another one, and the number of targets comes first. Snapshots come from clients, so nothing in them is read
 //! before the code is checked. A service may accept unsigned ones, so all in them is bounded and checked nevertheless:
-//! of the stored answers only as many are kept as a request may have, and the tracker validates its own part.
+//! of the stored answers only so many are kept as a session stores at most, and the tracker validates its own part.
 //!
 //! A tracker's own snapshot is a session too: that of a tracker in a page or a program, which has no key. It is accepted
 //! where unsigned ones are.
@@ -60,7 +60,7 @@ pub fn is_snapshot(bytes: &[u8]) -> bool {
 #[derive(Debug)]
 pub(super) struct SessionSnapshot {
     pub(super) targets: Targets,
-    /// The answers to the last request, oldest first; at least one.
+    /// The answers to the last frames, oldest first; at least one.
     pub(super) recent: Vec<Answered>,
 }
 

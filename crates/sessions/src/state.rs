@@ -12,7 +12,8 @@ use std::sync::Arc;
 #[derive(Debug, Clone)]
 pub struct SessionState {
     targets: Targets,
-    /// The last answers, oldest first: those to the last request, and more where that asked for it.
+    /// The answers to the last frames, oldest first: to those of the last request, and to so many before them as that
+    /// request asked for.
     recent: Vec<Answered>,
 }
 
@@ -148,8 +149,8 @@ impl SessionState {
 
     /// Whether a request is to be processed or was answered before. `number` is what the client calls its (first)
     /// frame; `given` is the box, where it corrects one. Without a number every request is processed. With one, a
-    /// request is a replay if its last frame is the session's last frame and all its frames are in the last request,
-    /// with the same bytes and the same box.
+    /// request is a replay if the answers to all its frames are stored, and were given for the same bytes and the same
+    /// box.
     ///
     /// # Errors
     /// The frame number does not fit.
