@@ -1,7 +1,9 @@
 //! Bounds how often a client asks for what takes no turn at the workers: pages, states, what is refused.
 //!
-//! All of it is done on the network threads, so a client that asks as fast as it can takes them from the others. It is
-//! known by its address: most of it needs no key. A trusted proxy that asks for itself is not counted.
+//! Most of it is done on the network threads, so a client that asks as fast as it can takes them from the others. The
+//! other requests by GET count with it, though the metrics are rendered beside these threads, and a worker makes
+//! snapshots and pictures of the bag. The client is known by its address, since pages and refusals need no key. A
+//! trusted proxy that asks for itself is not counted.
 
 use super::client_identity::{REFUSAL_DELAY, client_at};
 use crate::http::problems::problem::Problem;

@@ -1,8 +1,9 @@
 //! What clients may hold together of something, and each client of it: bytes, places.
 //!
-//! A client may hold no more than is free (a dynamic threshold: Choudhury, Hahne 1998), and no more than its own maximum.
-//! So each further client finds half of what those before it left, and no number of greedy ones takes all. The networks
-//! that a client is in may hold no more than is free either, so that many addresses of one network are no many shares.
+//! A client may hold no more than is free (a dynamic threshold: Choudhury, Hahne 1998), and no more than its own
+//! maximum. So each further client finds half of what those before it left, and no number of greedy ones takes all. The
+//! networks that a client is in may hold no more than is free either, or than one client may where that is more: the
+//! addresses of one network do not add up to many shares.
 //!
 //! A client may have parts, of which none holds more than it leaves of the client's budget.
 
