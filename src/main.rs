@@ -1,4 +1,4 @@
-//! The command line: `serve` (the default), `track`, `eval`, `sample`, `health`.
+//! The command line: `serve` (the default), `track`, `eval`, `sample`, `health`, `completions`.
 
 mod cli;
 

@@ -1,4 +1,5 @@
-// Saving results: one function a format. Boxes are in the video's own pixels, and in all formats but MOT count from 0.
+// Saving results: one function a format. Pixels are the video's own, from 0 (in MOT from 1); YOLO and Label Studio have
+// shares of the picture.
 
 import { projectOf } from "./project.js";
 import { zip } from "./zip.js";

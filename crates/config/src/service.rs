@@ -95,7 +95,7 @@ settings! {
         tls: TlsConfig;
         /// What one request and one client may take.
         limits: LimitsConfig;
-        /// The store that replicas share.
+        /// Where sessions are kept.
         store: StoreConfig;
         /// Who may use the service.
         access: AccessConfig;

@@ -1,4 +1,5 @@
-//! `POST /track`: a snapshot and a frame get a box and a new snapshot. Nothing is kept here.
+//! `POST /track`: a frame and a box, or a snapshot and the next frame, get a box and a new snapshot; a video and a box
+//! get an answer for each frame ([`track_video`](super::track_video)). Nothing is kept here.
 
 use super::track_file::TrackFile;
 use super::track_video::{Track, VideoAnswers, VideoTrack};

@@ -1,8 +1,8 @@
 //! `GET /sessions/{id}/stream`: a session over a WebSocket.
 //!
-//! In: a binary message is a frame. A text message before it may give its number or a corrected box ([`message`]).
-//! Out: text messages, JSON. The first tells the number of the next frame, or the stored answers where the client takes
-//! up after a broken line. Then each frame gets its answer or its problem, in order.
+//! In: a binary message is a frame. A text message before it may give its number or a corrected box, or ask what the
+//! tracker saw ([`message`]). Out: text messages, JSON. The first tells the number of the next frame. Where the client
+//! takes up after a broken line the stored answers follow. Then each frame gets its answer or its problem, in order.
 //!
 //! A frame passes the same checks as a plain post: quotas, the queue, the turn of its client. Where there is no place
 //! the frame waits, a few behind it wait too ([`waiting`]), and then the socket is not read: TCP holds the client back.

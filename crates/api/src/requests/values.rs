@@ -106,7 +106,7 @@ impl PartialSchema for NamesText {
     }
 }
 
-/// Frames a second, above 0 and at most 1000.
+/// Frames a second, from 0.001 to 1000.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameRate(pub f64);
 

@@ -1,9 +1,9 @@
 //! Who gets the next free worker: the client that has one least, and among those the one that used least time.
 //!
 //! This is start-time fair queueing (Goyal, Vin, Cheng 1996) with measured instead of announced lengths: a client's
-//! requests wait in a flow of their own, in order of arrival, and each flow counts the processor time of its work. A flow
-//! that had no work saves up a small claim, so a client that sends less than its share hardly waits for those that send
-//! all they can.
+//! requests wait in a flow of their own, in order of arrival (where they wait too long, [the newest goes
+//! first](super::controlled_delay)), and each flow counts the processor time of its work. A flow that had no work saves
+//! up a small claim, so a client that sends less than its share hardly waits for those that send all they can.
 //!
 //! Clients whose work is slow have workers of their own ([`SizeClass`]), so that the frames of the others need not wait
 //! until a slow one is done. How slow it was is remembered for some time, and what is known of work before it begins
