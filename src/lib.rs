@@ -16,8 +16,9 @@
 //! | [`bagtrack_ingest`] | JPEG, PNG and WebP files to frames, with limits that are checked before decoding |
 //! | [`bagtrack_sample`] | synthetic clips with exact ground truth |
 //!
-//! The feature `turbo` decodes JPEGs with libjpeg-turbo, `tls` (a default) serves HTTPS and reaches a store behind TLS,
-//! `otel` exports spans.
+//! Three features are on by default: `redis` has the store that replicas share, `tls` serves HTTPS and reaches a store
+//! behind TLS, `jwt` takes the tokens of an identity provider. `turbo` decodes JPEGs with libjpeg-turbo, `otel` exports
+//! spans.
 //!
 //! Data goes one way, `http -> sessions -> ingest -> tracker`, and the answer comes back the same way.
 
