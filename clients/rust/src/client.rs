@@ -134,9 +134,9 @@ impl ClientBuilder {
         self
     }
 
-    /// After so many frames a session takes a snapshot (30), and keeps the frames after it (at most 128). Zero: never,
-    /// so that a session ends with the service, unless that drains first. A service with a store needs none, and none
-    /// are taken.
+    /// After so many frames a session takes a snapshot (30; more than 128 count as 128), and keeps the frames after it.
+    /// Zero: never, so that a session ends with the service, unless that drains first. A service with a store needs none,
+    /// and none are taken.
     pub fn snapshot_every(mut self, frames: u32) -> Self {
         self.snapshot_every = frames;
         self
