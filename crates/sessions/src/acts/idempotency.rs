@@ -1,9 +1,10 @@
 //! A request to open a session that is sent again gets the same answer, and opens no second one: it has an
 //! `Idempotency-Key`, or an id that its client made.
 //!
-//! In memory a name is kept as long as its session, so there are never more of them than sessions. In a store none is
-//! kept: the id follows from the key (`id_of`), and the store takes the first of two sessions of one id. Requests with
-//! one name are served one after the other. Problems are not stored: the request can be sent again after them.
+//! In memory a name is kept as long as its session. Requests that were refused leave names as well, which go when there
+//! are too many. In a store none is kept: the id follows from the key (`id_of`), and the store takes the first of two
+//! sessions of one id. Requests with one name are served one after the other. Problems are not stored: the request can
+//! be sent again after them.
 
 use crate::Owner;
 use crate::sync::{Mutex, MutexGuard, PoisonError};
