@@ -54,7 +54,7 @@ pub struct TargetView {
     /// Where the target is.
     #[serde(rename = "box")]
     pub rect: Rect,
-    /// The chance that the box overlaps the target by half or more.
+    /// The chance that the box overlaps the target by half or more; with the preset `paper` it only orders frames.
     #[cfg_attr(feature = "service", schema(value_type = f32, minimum = 0, maximum = 1, example = 0.87))]
     pub score: f64,
     /// `tracking`, `uncertain` or `lost`.

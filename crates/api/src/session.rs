@@ -88,7 +88,7 @@ pub struct Version {
     /// Always `bagtrack`.
     #[cfg_attr(feature = "service", schema(example = "bagtrack"))]
     pub name: String,
-    /// Its version. Snapshots of another one are refused.
+    /// Its version. Another one may write snapshots of another format, which are refused.
     #[cfg_attr(feature = "service", schema(example = "0.1.0"))]
     pub version: String,
 }

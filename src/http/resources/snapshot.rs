@@ -11,9 +11,9 @@ use bagtrack_api::requests::BinaryBody;
 
 /// Take a snapshot
 ///
-/// The bytes hold the whole session. Post them to `/sessions`, here or at another instance of the same version that has
-/// the same secret (`BAGTRACK_SNAPSHOT_KEYS`), to go on from there under a new id; this session lives on as long as it
-/// would have done.
+/// The bytes hold the whole session. Post them to `/sessions`, here or at another instance that has the same secret
+/// (`BAGTRACK_SNAPSHOT_KEYS`) and reads their format, to go on from there under a new id; this session lives on as long
+/// as it would have done.
 ///
 /// `curl -o s.snapshot http://localhost:8080/sessions/$ID/snapshot &&
 /// curl --data-binary @s.snapshot http://other:8080/sessions`
