@@ -56,7 +56,7 @@ mutants crate="access" features="jwt" *flags:
 instructions:
     tools/count_instructions.sh
 
-# The fuzz targets, a minute each as CI does: `just fuzz 60 decode`, or an hour each: `just fuzz 3600`.
+# The fuzz targets, a minute each: `just fuzz 60 decode`, or an hour each: `just fuzz 3600`.
 fuzz seconds="60" *targets:
     fuzz/run.sh {{seconds}} {{targets}}
 
