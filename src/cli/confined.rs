@@ -1,9 +1,9 @@
 //! `bagtrack confined PROGRAM …`: gives up rights, then becomes the program. `serve` starts ffmpeg so.
 //!
-//! Landlock leaves it the system's programs and libraries to read, and nothing to write; a filter of system calls leaves
-//! it no sockets, and no way to look into other processes. What it works on comes as its standard input. Both hold for
-//! all that it starts, and cannot be taken back. Where the system has none of them it runs without, which `serve` tells at
-//! its start.
+//! Landlock leaves it the system's programs and libraries to read, and nothing to write; a filter of system calls
+//! leaves it no sockets, and no way to look into other processes. What it works on comes as its standard input. Both
+//! hold for all that it starts, and cannot be taken back. Where the system lacks one of them it runs with the other
+//! alone, or with none, which `serve` tells at its start.
 
 use std::error::Error;
 use std::ffi::OsString;
