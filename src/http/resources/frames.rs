@@ -31,7 +31,8 @@ type FramesJson = JsonBody<FramesSettings>;
 ///
 /// With `Accept: application/x-ndjson` each frame is answered by a line of JSON as soon as it is tracked. Frames before
 /// one that is refused count then; its problem document is the last line. So is a video answered, where the service has
-/// an `ffmpeg`. With `Accept: image/png` or `draw` the answer is the frame with boxes, scores and particles drawn on it.
+/// an `ffmpeg`. With `Accept: image/png` or `draw` the answer is the frame with boxes, scores and particles drawn on
+/// it, reduced to at most 2048 pixels on its longer side.
 ///
 /// `curl --data-binary @next.jpg http://localhost:8080/sessions/$ID/frames`
 #[utoipa::path(
