@@ -63,8 +63,8 @@ fn with_layers(routes: Router, state: &AppState) -> Router {
     ))
 }
 
-/// The routes of the service, each behind the checks of who may use it. Probes come from the machine's own address and
-/// with no key.
+/// The routes of the service, each behind the checks of who may use it, but for probes: they have no key, and name the
+/// machine by its address.
 fn routes(state: &AppState) -> Router<AppState> {
     let of_page = middleware::from_fn_with_state(state.clone(), page_request);
     let of_sessions = middleware::from_fn_with_state(state.clone(), session_request);
