@@ -136,9 +136,9 @@ kinds! {
             much together."
         cure: "Read `detail`: it tells the range. All parameters are at `/docs`."
     InvalidSnapshot: 422 "invalid-snapshot" "The snapshot cannot be restored"
-        cause: "The bytes were changed, come from another version, or were signed with other keys."
-        cure: "Send the bytes of `GET /sessions/{id}/snapshot` unchanged, to a service with the same \
-            `BAGTRACK_SNAPSHOT_KEYS` and version."
+        cause: "The bytes were changed, have a format that this version does not read, or were signed with other keys."
+        cure: "Send the bytes of `GET /sessions/{id}/snapshot` unchanged, to a service that has the \
+            same `BAGTRACK_SNAPSHOT_KEYS` and reads that format."
     IdempotencyKeyReused: 422 "idempotency-key-reused" "The idempotency key was used for another request"
         cause: "The same `Idempotency-Key` came with another frame or other settings."
         cure: "Make a new key for each session."

@@ -42,8 +42,8 @@ type FramesJson = JsonBody<FramesSettings>;
         FramesSettings,
     ),
     request_body(
-        description = "The frame as a raw body (JPEG, PNG, WebP, or a video: MP4, WebM, GIF, Motion JPEG as \
-            `video/x-motion-jpeg`), as a form, or as JSON with base64. The last two take several frames.",
+        description = "The frame as a raw body (JPEG, PNG, WebP, or a video: MP4, MOV, WebM, Matroska, GIF, Motion JPEG \
+            as `video/x-motion-jpeg`), as a form, or as JSON with base64. The last two take several frames.",
         content(
             (BinaryBody = "application/octet-stream"),
             (FramesForm = "multipart/form-data"),

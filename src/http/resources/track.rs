@@ -52,8 +52,8 @@ type TrackJson = JsonBody<TrackSettings>;
     post, path = "/track", tag = "sessions", operation_id = "track",
     params(TrackSettings),
     request_body(
-        description = "The frames and the snapshot. A raw frame begins a track; so does a video (MP4, WebM, GIF, Motion \
-            JPEG as `video/x-motion-jpeg`).",
+        description = "The frames and the snapshot. A raw frame begins a track; so does a video (MP4, MOV, \
+            WebM, Matroska, GIF, Motion JPEG as `video/x-motion-jpeg`).",
         content(
             (TrackForm = "multipart/form-data"),
             (

@@ -36,7 +36,7 @@ const COMMENT: [u8; 2] = [0xFF, 0xFE];
 #[utoipa::path(
     post, path = "/frames", tag = "service", operation_id = "getVideoFrames",
     request_body(
-        description = "The video: MP4, WebM, GIF, or Motion JPEG as `video/x-motion-jpeg`.",
+        description = "The video: MP4, MOV, WebM, Matroska, GIF, or Motion JPEG as `video/x-motion-jpeg`.",
         content((BinaryBody = "application/octet-stream"))
     ),
     responses(

@@ -50,7 +50,17 @@ async fn every_documented_problem_can_be_provoked_and_changes_no_session() {
     let kinds: BTreeSet<&str> = documented.iter().map(|(_, slug)| slug.as_str()).collect();
     assert!(kinds.len() >= 20 && documented.len() >= 50, "{kinds:?}");
     for (operation, slug) in &documented {
-        if slug == "work-timeout" {
+        let is_elsewhere = match &**slug {
+            "work-timeout" => true,
+            // The pictures of a video take an ffmpeg.
+            "frame-too-large" => operation.path == "/frames",
+            // One frame costs too much where it takes long; several, where their headers say so.
+            "request-too-costly" => {
+                !["/track", "/sessions/{id}/frames"].contains(&&*operation.path)
+            }
+            _ => false,
+        };
+        if is_elsewhere {
             continue;
         }
         println!("{} {}: {slug}", operation.method, operation.path);

@@ -127,6 +127,20 @@ async fn a_video_comes_back_frame_by_frame() {
     .await;
 }
 
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn a_video_of_too_large_pictures_comes_back_as_a_problem() {
+    let app = TestApplication::start_with(|config| config.max_frame_pixels = 1000);
+    let app = app.await;
+    let request = app.request(Method::POST, "/frames", &[]);
+    let refused = request
+        .body(pattern("mp4", 2, "-vf scale=1280:720 "))
+        .send()
+        .await
+        .unwrap();
+    expect_problem(refused, "frame-too-large").await;
+}
+
 /// The times that JPEG files which follow each other tell in their first comments.
 fn times(motion_jpeg: &[u8]) -> Vec<f64> {
     let begins = |window: &[u8]| window == b"\xFF\xD8\xFF\xFE";

@@ -152,7 +152,7 @@ pub struct TrackSettings {
         value_type = f64,
         required = false,
         nullable = false,
-        exclusive_minimum = 0,
+        minimum = 0.001,
         maximum = 1000
     )]
     pub rate: Option<FrameRate>,
