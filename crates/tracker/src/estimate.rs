@@ -37,7 +37,7 @@ pub struct Estimate {
     pub frame: u64,
     /// Where the target is, in the pixels of the uploaded frame.
     pub target: Rect,
-    /// The chance, in [0, 1], that the box overlaps the target by half or more.
+    /// The chance, in [0, 1], that the box overlaps the target by half or more; with `paper` it only orders frames.
     pub score: f32,
     /// What the score and its history mean.
     pub status: Status,

@@ -5,7 +5,7 @@
 //! turns. A frame passes while that distance is below a multiple of its running mean. The mean follows slowly in frames
 //! that do not pass, too, so a lasting change is accepted in the end.
 //!
-//! Where such jumps are usual the score decides: a frame passes only if its box is more likely right than wrong.
+//! Where such jumps are usual the score decides: a frame passes only if its box is right two times of three.
 
 use serde::{Deserialize, Serialize};
 

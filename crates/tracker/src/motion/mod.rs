@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | `particles` | a particle z = (x, y, s) in working pixels, and the bounds that every particle is clamped to | paper |
 //! | `resampling` | the particle filter: resampling by weight and Brownian motion (section III-A) | paper |
-//! | `random` | the generator of a frame's draws | paper |
+//! | `random` | the generator of a frame's draws | ours |
 //! | `search` | the search around the last answer: how wide, how many particles, the prior on the displacement | ours |
 //! | `proposal` | draws around the last answer and, in a second round, around the best of the first | ours |
 //! | `global_motion` | the displacement of the whole image between two frames | ours |

@@ -154,9 +154,9 @@ parameters! {
         alpha: f64 [0 to 1];
         /// σ, the distance at which a likelihood has fallen to 1/e (equation 11).
         sigma: f64 [0.0001 to 100];
-        /// Standard deviation of the Brownian motion along x, in pixels a frame (section III-A).
+        /// Standard deviation of the Brownian motion along x, in working pixels a frame (section III-A).
         motion_std_x: f64 [0 to 320];
-        /// Standard deviation of the Brownian motion along y, in pixels a frame (section III-A).
+        /// Standard deviation of the Brownian motion along y, in working pixels a frame (section III-A).
         motion_std_y: f64 [0 to 320];
         /// Standard deviation of the Brownian motion of the scale, a frame (section III-A). The scale of the first box
         /// is 1. With `robust` it is that of the scale's logarithm.
@@ -167,9 +167,9 @@ parameters! {
         /// How many vectors of areas beside the target the Mahalanobis metric is made of: what the background has too
         /// counts less. With `robust`. Off: 0.
         background_samples: u32 [0 to 256];
-        /// Standard deviation of the prior on the displacement in a frame, in pixels: a look-alike far away loses. Up
-        /// to twice as much for a place that looks more like the first box than the last answer does. With `robust`.
-        /// Off: 0.
+        /// Standard deviation of the prior on the displacement in a frame, in working pixels: a look-alike far away
+        /// loses. Up to twice as much for a place that looks more like the first box than the last answer does. With
+        /// `robust`. Off: 0.
         displacement_std: f64 [0 to 1000];
         /// Seed of all random draws: the same seed and frames give the same boxes.
         seed: u64;
