@@ -77,11 +77,10 @@ pub use snapshot::{
 };
 pub use state::{SessionState, StepError};
 pub use store::{
-    AddressError, Commit, Durability, DurabilityError, FileStore, FileStoreError, Gone, Intent,
-    Local, Outcome, Record, SessionName, SessionStore, Step, StoreAddress, StoreFuture,
-    StoreUnavailable, UnreadableRecord, Version, reconcile,
+    AddressError, Commit, Counted, Durability, DurabilityError, FileStore, FileStoreError, Outcome,
+    Record, SessionName, SessionStore, StoreAddress, StoreFuture, StoreShare, StoreUnavailable,
+    UnreadableRecord, Version,
 };
-pub use store::{Counted, StoreShare};
 #[cfg(feature = "redis")]
 pub use store::{NewHash, RedisAddress, RedisAddressError, RedisStore, ScriptServer};
 #[cfg(fuzzing)]

@@ -5,7 +5,7 @@ use super::frames::{FrameBatch, Tracked};
 use super::service::SessionService;
 use crate::clock::timeout;
 use crate::planted::{PlantedFault, commit_later};
-use crate::store::{Commit, Intent, Local, Outcome, Step, StoreUnavailable, reconcile};
+use crate::store::{Commit, Intent, Outcome, Step, StoreUnavailable, reconcile};
 use crate::{
     LockedSession, QueuePermit, ReplayError, SessionBusy, SessionPermit, SessionState, Stopped,
 };
@@ -74,13 +74,7 @@ impl SessionService {
                 .commit(&locked, &attempt, &batch, intent, is_told)
                 .await;
             let incarnation = locked.session().name().incarnation;
-            match reconcile(
-                Local {
-                    incarnation,
-                    intent,
-                },
-                outcome,
-            ) {
+            match reconcile(incarnation, intent, outcome) {
                 Step::Commit(_) => return attempt.accept(&mut locked, was_late),
                 Step::GoOn(record) => {
                     was_late |= matches!(attempt, Attempt::Tracked(..));

@@ -3,7 +3,7 @@
 use super::error::ActError;
 use super::service::SessionService;
 use crate::planted::PlantedFault;
-use crate::store::{Intent, Local, Record, Step, StoreUnavailable, reconcile};
+use crate::store::{Record, Step, StoreUnavailable};
 use crate::{
     Flow, LockedSession, NewSession, NoSession, Owner, Session, SessionState, SnapshotError,
 };
@@ -71,15 +71,7 @@ impl SessionService {
         let Some(session) = self.registry.live(id) else {
             return self.load(id, flow).await;
         };
-        let (Some(store), Some(version)) = (&self.store, session.version()) else {
-            return Ok(Some(session));
-        };
-        let name = session.name();
-        let local = Local {
-            incarnation: name.incarnation,
-            intent: Intent::Newest,
-        };
-        match reconcile(local, store.check(name, version, false, None).await) {
+        match self.ask(&session, false).await {
             Step::Commit(_) | Step::GoOn(_) | Step::Conflict(_) => Ok(Some(session)),
             Step::Replaced(record) => self.insert(id, *record, flow).await.map(Some),
             Step::Gone(_) => {

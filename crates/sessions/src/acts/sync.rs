@@ -7,7 +7,7 @@ use super::error::ActError;
 use super::service::SessionService;
 use crate::clock::timeout;
 use crate::planted::PlantedFault;
-use crate::store::{Commit, Gone, Intent, Local, Outcome, Step, StoreUnavailable, reconcile};
+use crate::store::{Commit, Gone, Intent, Outcome, Step, StoreUnavailable, reconcile};
 use crate::{
     Flow, LockedSession, NoSession, QueuePermit, Session, SessionBusy, SessionPermit, SessionState,
     Stopped, WorkMeter, WorkPanicked,
@@ -137,7 +137,7 @@ impl SessionService {
                 true => store.check(session.name(), version, true, None).await,
                 false => store.fence(session.name(), version).await,
             };
-            let step = reconcile(local(&session), outcome);
+            let step = reconcile(session.name().incarnation, Intent::Newest, outcome);
             let is_fenced = matches!(step, Step::Commit(_));
             locked = self.follow(locked, step, flow).await?;
             if is_fenced {
@@ -161,7 +161,7 @@ impl SessionService {
     }
 
     /// Asks the store whether the copy of a session is the newest.
-    async fn ask(&self, session: &Session, takes_over: bool) -> Step {
+    pub(super) async fn ask(&self, session: &Session, takes_over: bool) -> Step {
         let outcome = match (&self.store, session.version()) {
             (Some(store), Some(version)) => {
                 let checked = store.check(session.name(), version, takes_over, None);
@@ -169,7 +169,7 @@ impl SessionService {
             }
             _ => Ok(Outcome::Committed(session.ttl())),
         };
-        reconcile(local(session), outcome)
+        reconcile(session.name().incarnation, Intent::Newest, outcome)
     }
 
     /// Does a step with a locked session.
@@ -252,12 +252,5 @@ impl SessionService {
             session.set_version(Some(before.committed(frame, true)));
         }
         Ok(is_written)
-    }
-}
-
-fn local(session: &Session) -> Local {
-    Local {
-        incarnation: session.name().incarnation,
-        intent: Intent::Newest,
     }
 }

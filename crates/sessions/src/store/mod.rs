@@ -36,7 +36,7 @@ pub use address::{AddressError, StoreAddress};
 pub use file::{Durability, DurabilityError, FileStore, FileStoreError};
 #[cfg(fuzzing)]
 pub use file::{record_of_row, row_and_state};
-pub use reconcile::{Gone, Intent, Local, Step, reconcile};
+pub(crate) use reconcile::{Gone, Intent, Step, reconcile};
 pub use record::{Record, SessionName, UnreadableRecord, Version};
 pub use session_store::{
     Commit, Counted, Outcome, SessionStore, StoreFuture, StoreShare, StoreUnavailable,

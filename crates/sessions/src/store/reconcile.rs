@@ -19,15 +19,6 @@ pub enum Intent {
     },
 }
 
-/// A replica's copy of a session, for a request.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Local {
-    /// The incarnation of the session that the copy is of.
-    pub incarnation: u64,
-    /// What the request wants.
-    pub intent: Intent,
-}
-
 /// Why a session is gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Gone {
@@ -54,8 +45,12 @@ pub enum Step {
     Unavailable(StoreUnavailable),
 }
 
-/// Reads the outcome of a call to the store.
-pub fn reconcile(local: Local, outcome: Result<Outcome, StoreUnavailable>) -> Step {
+/// Reads the outcome of a call to the store, for a request that wants this of a copy of the session of this incarnation.
+pub fn reconcile(
+    incarnation: u64,
+    intent: Intent,
+    outcome: Result<Outcome, StoreUnavailable>,
+) -> Step {
     let record = match outcome {
         Err(_) if PlantedFault::TakesSilenceForConsent.is_here() => {
             return Step::Commit(Duration::from_secs(60));
@@ -68,10 +63,10 @@ pub fn reconcile(local: Local, outcome: Result<Outcome, StoreUnavailable>) -> St
         Ok(Outcome::Full) => return Step::Unavailable(StoreUnavailable("it is full".to_owned())),
         Ok(Outcome::Conflict(record)) => record,
     };
-    if record.opening.incarnation != local.incarnation {
+    if record.opening.incarnation != incarnation {
         return Step::Replaced(record);
     }
-    match local.intent {
+    match intent {
         // Another replica may have later frames by now; the frame lies before them.
         Intent::Past { is_told: true } => Step::Commit(record.ttl),
         Intent::Unordered => Step::Conflict(record),
@@ -111,11 +106,7 @@ mod tests {
             (conflict(8), ["replaced"; 4]),
         ] {
             for (intent, expected) in intents.into_iter().zip(expected) {
-                let local = Local {
-                    incarnation: 7,
-                    intent,
-                };
-                let step = reconcile(local, outcome.clone());
+                let step = reconcile(7, intent, outcome.clone());
                 assert_eq!(named(&step), expected, "{outcome:?} for {intent:?}");
             }
         }
