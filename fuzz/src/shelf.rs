@@ -200,10 +200,10 @@ impl SessionStore for Shelf {
     }
 
     /// What the service writes, it reads.
-    fn commit<'a>(&'a self, commit: Commit<'a>) -> StoreFuture<'a, Outcome> {
+    fn commit(&self, commit: Commit) -> StoreFuture<'_, Outcome> {
         Box::pin(async move {
             if let Some(state) = commit.state {
-                let read = SessionState::from_stored(state, MAX_RECENT, None, None);
+                let read = SessionState::from_stored(&state, MAX_RECENT, None, None);
                 let read = read.expect("a state that was written is read");
                 assert_eq!(read.latest_frame(), commit.frame);
                 let mut written = lock(&self.written);

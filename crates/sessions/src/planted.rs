@@ -1,8 +1,5 @@
 //! Faults that a simulation must find. They are in builds with the feature `planted-faults` only, and there one at a time.
 
-use crate::store::{Commit, SessionStore};
-use std::sync::Arc;
-
 /// A fault of the code. Some are in the scripts of a Redis alone.
 #[cfg_attr(not(feature = "redis"), allow(dead_code))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,28 +70,4 @@ thread_local! {
 #[cfg(feature = "planted-faults")]
 pub fn plant(fault: Option<PlantedFault>) {
     HERE.set(fault);
-}
-
-/// Commits a frame when it has been answered.
-pub(crate) fn commit_later(store: Arc<dyn SessionStore>, commit: &Commit) {
-    let Commit {
-        name,
-        before,
-        frame,
-        takes_over,
-        ttl,
-        ..
-    } = *commit;
-    let state = commit.state.map(<[u8]>::to_vec);
-    tokio::spawn(async move {
-        let commit = Commit {
-            name,
-            before,
-            frame,
-            state: state.as_deref(),
-            takes_over,
-            ttl,
-        };
-        let _ = store.commit(commit).await;
-    });
 }

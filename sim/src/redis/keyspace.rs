@@ -82,7 +82,7 @@ impl Keyspace {
     /// What a Redis says to that.
     pub fn make_hash(&mut self, new: &NewHash) -> Result<(), String> {
         let key = new.key.as_bytes();
-        self.set_fields(key, &[new.field.as_bytes().to_vec(), new.value.clone()])?;
+        self.set_fields(key, &[new.field.as_bytes().to_vec(), new.value.to_vec()])?;
         let ttl = i64::try_from(new.ttl.as_millis()).unwrap_or(i64::MAX);
         self.expire(key, ttl).map(|_| ())
     }

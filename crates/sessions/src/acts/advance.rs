@@ -4,7 +4,7 @@ use super::error::{ActError, FramesError};
 use super::frames::{FrameBatch, Tracked};
 use super::service::SessionService;
 use crate::clock::timeout;
-use crate::planted::{PlantedFault, commit_later};
+use crate::planted::PlantedFault;
 use crate::store::{Commit, Intent, Outcome, Step, StoreUnavailable, reconcile};
 use crate::{
     LockedSession, QueuePermit, ReplayError, SessionBusy, SessionPermit, SessionState, Stopped,
@@ -18,7 +18,7 @@ const MAX_ATTEMPTS: usize = 4;
 /// What came of the frames, on a copy of the state.
 enum Attempt {
     /// They were tracked, up to this state; its bytes are there where they are to be written.
-    Tracked(Box<SessionState>, Tracked, Option<Vec<u8>>),
+    Tracked(Box<SessionState>, Tracked, Option<Bytes>),
     /// They were answered before.
     Replayed(Tracked),
     /// Their number does not fit this state. Another one might.
@@ -123,7 +123,7 @@ impl SessionService {
                 Ok(tracked) => {
                     let is_due = |checkpoint| copy.latest_frame() >= checkpoint + every;
                     let bytes = session.checkpoint().is_some_and(is_due);
-                    let bytes = bytes.then(|| copy.stored());
+                    let bytes = bytes.then(|| copy.stored().into());
                     Attempt::Tracked(Box::new(copy), tracked, bytes)
                 }
                 Err(FramesError::Replay(error)) => Attempt::Misnumbered(error),
@@ -153,13 +153,14 @@ impl SessionService {
                     name: session.name(),
                     before,
                     frame: state.latest_frame(),
-                    state: bytes.as_deref(),
+                    state: bytes.clone(),
                     // A frame that comes late, after others that only another replica has, takes nothing back.
                     takes_over: is_told || batch.number.is_none(),
                     ttl,
                 };
                 if PlantedFault::AnswersBeforeCommit.is_here() {
-                    commit_later(store.clone(), &commit);
+                    let store = store.clone();
+                    tokio::spawn(async move { store.commit(commit).await });
                     return Ok(Outcome::Committed(ttl));
                 }
                 store.commit(commit).await

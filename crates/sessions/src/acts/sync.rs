@@ -242,7 +242,7 @@ impl SessionService {
             name: session.name(),
             before,
             frame,
-            state: Some(&bytes),
+            state: Some(bytes.into()),
             takes_over: false,
             // What is left by this clock may be nothing after a jump, and the store would drop the record.
             ttl: self.registry.idle_lease(),

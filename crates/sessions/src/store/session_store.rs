@@ -1,6 +1,7 @@
 //! What a store of sessions does, whatever keeps them.
 
 use super::record::{Record, SessionName, Version};
+use bytes::Bytes;
 use futures_util::future::BoxFuture;
 use std::fmt::Debug;
 use std::time::Duration;
@@ -27,8 +28,8 @@ pub enum Outcome {
 }
 
 /// A frame that is to be committed.
-#[derive(Debug, Clone, Copy)]
-pub struct Commit<'a> {
+#[derive(Debug, Clone)]
+pub struct Commit {
     /// Which session.
     pub name: SessionName,
     /// The version that the frame was tracked from.
@@ -36,7 +37,7 @@ pub struct Commit<'a> {
     /// The number of the frame.
     pub frame: u64,
     /// The state after it, where it is written.
-    pub state: Option<&'a [u8]>,
+    pub state: Option<Bytes>,
     /// Whether this replica goes on from the record that a conflict tells.
     pub takes_over: bool,
     /// How long the record lives from now without a frame.
@@ -88,7 +89,7 @@ pub trait SessionStore: Debug + Send + Sync {
     fn load(&self, id: Uuid) -> StoreFuture<'_, Option<Record>>;
 
     /// Moves a record from one version to a frame.
-    fn commit<'a>(&'a self, commit: Commit<'a>) -> StoreFuture<'a, Outcome>;
+    fn commit(&self, commit: Commit) -> StoreFuture<'_, Outcome>;
 
     /// Asks whether this version is the newest. `takes_over` says that this replica goes on from the record that a conflict
     /// tells; `renew` sets the record's time to live.

@@ -74,7 +74,7 @@ impl Known {
             name: self.name,
             before: self.version,
             frame,
-            state: Some(&state),
+            state: Some(state.clone().into()),
             takes_over: false,
             ttl,
         };

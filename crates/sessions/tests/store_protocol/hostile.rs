@@ -252,28 +252,9 @@ impl SessionStore for HostileStore {
         self.call(false, move |records| records.load(id))
     }
 
-    fn commit<'a>(&'a self, commit: Commit<'a>) -> StoreFuture<'a, Outcome> {
-        let Commit {
-            name,
-            before,
-            frame,
-            takes_over,
-            ttl,
-            ..
-        } = commit;
-        let (token, state) = (rand::random(), commit.state.map(<[u8]>::to_vec));
-        self.call(false, move |records| {
-            let state = state.as_deref();
-            let commit = Commit {
-                name,
-                before,
-                frame,
-                state,
-                takes_over,
-                ttl,
-            };
-            records.commit(token, commit)
-        })
+    fn commit(&self, commit: Commit) -> StoreFuture<'_, Outcome> {
+        let token = rand::random();
+        self.call(false, move |records| records.commit(token, commit.clone()))
     }
 
     fn check(

@@ -79,7 +79,7 @@ impl Backend for Records {
         }
     }
 
-    fn commit(&mut self, token: u64, commit: Commit<'_>) -> Outcome {
+    fn commit(&mut self, token: u64, commit: Commit) -> Outcome {
         let kept = match self.find(commit.name) {
             Ok(kept) => kept,
             Err(outcome) => return outcome,

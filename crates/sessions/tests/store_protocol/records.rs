@@ -15,7 +15,7 @@ pub trait Backend: Send {
     /// A call with the token of the last write does nothing.
     fn create(&mut self, token: u64, id: Uuid, record: &Record) -> Outcome;
     fn load(&mut self, id: Uuid) -> Option<Record>;
-    fn commit(&mut self, token: u64, commit: Commit<'_>) -> Outcome;
+    fn commit(&mut self, token: u64, commit: Commit) -> Outcome;
     fn check(&mut self, name: SessionName, version: Version, takes_over: bool) -> Outcome;
     fn fence(&mut self, name: SessionName, version: Version) -> Outcome;
     fn end(&mut self, name: SessionName) -> bool;
@@ -76,7 +76,7 @@ impl Backend for InFolder {
         Self::wait(self.store().load(id))
     }
 
-    fn commit(&mut self, _token: u64, commit: Commit<'_>) -> Outcome {
+    fn commit(&mut self, _token: u64, commit: Commit) -> Outcome {
         Self::wait(self.store().commit(commit))
     }
 

@@ -6,6 +6,7 @@ use bagtrack_sessions::{
     Commit, Counted, Outcome, RedisAddress, RedisStore, SessionName, SessionStore, StoreShare,
 };
 use bagtrack_testing::processes::{Process, free_port, redis_server};
+use bytes::Bytes;
 use redis::FromRedisValue;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -264,7 +265,7 @@ async fn a_commit_leaves_only_the_record_whatever_redis_says_to_its_transaction(
         name: session.name,
         before: before_last,
         frame: session.version.frame,
-        state: Some(b"late"),
+        state: Some(Bytes::from_static(b"late")),
         takes_over: false,
         ttl: TTL,
     };

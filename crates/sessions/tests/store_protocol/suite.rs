@@ -5,6 +5,7 @@ use bagtrack_sessions::{
     Commit, Estimates, Opening, Outcome, Owner, Record, SessionName, SessionStore, Version,
 };
 use bagtrack_tracker::{Estimate, Rect, Status};
+use bytes::Bytes;
 use std::time::Duration;
 use uuid::Uuid;
 
@@ -64,7 +65,7 @@ impl<'a> Stored<'a> {
             name: self.name,
             before,
             frame,
-            state,
+            state: state.map(Bytes::copy_from_slice),
             takes_over,
             ttl: TTL,
         };

@@ -6,7 +6,7 @@ use super::super::session_store::{
 };
 use super::database::{OpenError, Transaction};
 use super::durability::Durability;
-use super::rules::{Fault, OwnedCommit};
+use super::rules::Fault;
 use super::shares::Shares;
 use super::writer::{Call, Health, Ruled, Writer};
 use crate::clock::{Clock, timeout};
@@ -125,8 +125,7 @@ impl SessionStore for FileStore {
         self.call(move |transaction| transaction.load(id))
     }
 
-    fn commit<'a>(&'a self, commit: Commit<'a>) -> StoreFuture<'a, Outcome> {
-        let commit = OwnedCommit::from(commit);
+    fn commit(&self, commit: Commit) -> StoreFuture<'_, Outcome> {
         self.call(move |transaction| transaction.commit(&commit))
     }
 

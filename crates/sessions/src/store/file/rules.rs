@@ -36,29 +36,6 @@ impl Fault {
     }
 }
 
-/// A frame that is to be committed; see [`Commit`].
-pub(super) struct OwnedCommit {
-    pub(super) name: SessionName,
-    pub(super) before: Version,
-    pub(super) frame: u64,
-    pub(super) state: Option<Vec<u8>>,
-    pub(super) takes_over: bool,
-    pub(super) ttl: Duration,
-}
-
-impl From<Commit<'_>> for OwnedCommit {
-    fn from(commit: Commit<'_>) -> Self {
-        Self {
-            name: commit.name,
-            before: commit.before,
-            frame: commit.frame,
-            state: commit.state.map(<[u8]>::to_vec),
-            takes_over: commit.takes_over,
-            ttl: commit.ttl,
-        }
-    }
-}
-
 /// The key of the mark that a session was ended.
 fn ended_key(name: SessionName) -> [u8; 24] {
     let mut key = [0; 24];
@@ -203,7 +180,7 @@ impl Transaction<'_> {
         }
     }
 
-    pub(super) fn commit(&mut self, commit: &OwnedCommit) -> Result<Outcome, Fault> {
+    pub(super) fn commit(&mut self, commit: &Commit) -> Result<Outcome, Fault> {
         let id = commit.name.id;
         let Some(mut row) = self.row(id)? else {
             return self.absent(commit.name);

@@ -300,7 +300,7 @@ impl SessionStore for RedisStore {
         })
     }
 
-    fn commit<'a>(&'a self, commit: Commit<'a>) -> StoreFuture<'a, Outcome> {
+    fn commit(&self, commit: Commit) -> StoreFuture<'_, Outcome> {
         let before = commit.before;
         let mut script = self.on(&self.0.scripts.commit, commit.name);
         let token = token();
@@ -309,7 +309,7 @@ impl SessionStore for RedisStore {
             script.on_new(NewHash {
                 key: format!("{prefix}:new:{{{id}}}:{token}"),
                 field: "state",
-                value: state.to_vec(),
+                value: state,
                 ttl: UNCOMMITTED,
             });
         }

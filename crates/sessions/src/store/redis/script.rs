@@ -1,5 +1,6 @@
 //! A script with its keys and arguments, and what runs it.
 
+use bytes::Bytes;
 use redis::aio::ConnectionLike;
 use redis::{Pipeline, RedisError, RedisFuture, RedisResult, ScriptInvocation, ToRedisArgs, Value};
 use std::fmt;
@@ -13,7 +14,7 @@ pub struct NewHash {
     /// The name of the field.
     pub field: &'static str,
     /// What the field has.
-    pub value: Vec<u8>,
+    pub value: Bytes,
     /// How long the hash lives.
     pub ttl: Duration,
 }
