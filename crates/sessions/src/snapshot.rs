@@ -14,6 +14,7 @@ use super::compression;
 use super::mac::{MAC_BYTES, MacKeys};
 use super::per_target::{MAX_TARGETS, PerTarget};
 use super::replay::{Answered, Fingerprint, TargetAnswer};
+use super::state::SessionState;
 use super::targets::Targets;
 use bagtrack_tracker::{Expert, SNAPSHOT_MAGIC as TRACKER_MAGIC, Tracker, TrackerError};
 use postcard::take_from_bytes;
@@ -56,45 +57,37 @@ pub fn is_snapshot(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC) || bytes.starts_with(TRACKER_MAGIC)
 }
 
-/// What a snapshot holds.
-#[derive(Debug)]
-pub(super) struct SessionSnapshot {
-    pub(super) targets: Targets,
-    /// The answers to the last frames, oldest first; at least one.
-    pub(super) recent: Vec<Answered>,
-}
-
-impl SessionSnapshot {
-    /// The bytes of a session, with its code.
-    pub(super) fn encode(targets: &Targets, recent: &[Answered], keys: &MacKeys) -> Vec<u8> {
-        let mut bytes = Self::write(targets, recent);
+impl SessionState {
+    /// The session as bytes, signed.
+    pub fn snapshot(&self, keys: &MacKeys) -> Vec<u8> {
+        let mut bytes = self.stored();
         let code = keys.sign(&bytes);
         bytes.extend_from_slice(&code);
         bytes
     }
 
-    /// The session of `bytes`, with the last `max_recent` of its stored answers. One with a second opinion is that of
-    /// `expert`.
+    /// The session that a snapshot holds, with the last `max_recent` of its stored answers. One with a second opinion is
+    /// that of `expert`, which is the one of this process.
     ///
     /// # Errors
     /// See [`SnapshotError`].
-    pub(super) fn decode(
-        bytes: &[u8],
+    pub fn restore(
+        snapshot: &[u8],
         keys: &MacKeys,
         max_recent: usize,
         expert: Option<&Arc<dyn Expert>>,
     ) -> Result<Self, SnapshotError> {
-        if bytes.starts_with(TRACKER_MAGIC) {
-            return Self::of_tracker(bytes, keys, expert);
+        if snapshot.starts_with(TRACKER_MAGIC) {
+            return Self::of_tracker(snapshot, keys, expert);
         }
-        check_version(bytes)?;
-        let (content, code) = bytes
+        check_version(snapshot)?;
+        let (content, code) = snapshot
             .split_last_chunk::<MAC_BYTES>()
             .ok_or(SnapshotError::Damaged)?;
         if !keys.verify(content, code) {
             return Err(SnapshotError::NotAuthentic);
         }
-        Self::read(content, max_recent, expert, None)
+        Self::from_stored(content, max_recent, expert, None)
     }
 
     /// The session of a tracker that was elsewhere until now. Which bytes its last frame had is not known.
@@ -119,18 +112,18 @@ impl SessionSnapshot {
         Ok(Self { targets, recent })
     }
 
-    /// The bytes of a session, without a code.
-    pub(super) fn write(targets: &Targets, recent: &[Answered]) -> Vec<u8> {
-        let trackers = targets.trackers();
+    /// The session as bytes for the store, which are not signed.
+    pub fn stored(&self) -> Vec<u8> {
+        let trackers = self.targets.trackers();
         let (version, count) = match trackers {
             PerTarget::One(_) => (VERSION, Vec::new()),
             PerTarget::List(list) => (LIST_VERSION, extend(Vec::new(), &list.len())),
         };
-        let mut answers = extend(Vec::new(), &recent.len());
+        let mut answers = extend(Vec::new(), &self.recent.len());
         for Answered {
             fingerprint,
             targets,
-        } in recent
+        } in &self.recent
         {
             answers = extend(answers, fingerprint);
             answers = targets.as_slice().iter().fold(answers, extend);
@@ -147,12 +140,16 @@ impl SessionSnapshot {
         bytes
     }
 
-    /// The session of bytes without a code; `known` are its targets at another frame.
-    pub(super) fn read(
+    /// The session that [`Self::stored`] wrote. What it has in common with `known`, the session at another frame, is
+    /// not computed again.
+    ///
+    /// # Errors
+    /// See [`SnapshotError`].
+    pub fn from_stored(
         bytes: &[u8],
         max_recent: usize,
         expert: Option<&Arc<dyn Expert>>,
-        known: Option<&Targets>,
+        known: Option<&Self>,
     ) -> Result<Self, SnapshotError> {
         let (version, compressed) = check_version(bytes)?;
         let content = compression::decompress(compressed).ok_or(SnapshotError::Damaged)?;
@@ -167,7 +164,7 @@ impl SessionSnapshot {
             count = Some(number);
         }
         let mut known = known
-            .map_or(&[][..], |known| known.trackers().as_slice())
+            .map_or(&[][..], |known| known.targets.trackers().as_slice())
             .iter();
         let trackers = per_target(count, || {
             let tracker;

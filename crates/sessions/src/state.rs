@@ -1,9 +1,7 @@
 //! What work on a session changes: the trackers, and the answers that a repeated request gets again.
 
-use super::mac::MacKeys;
 use super::replay::{self, Answered, Fingerprint, ReplayDecision, ReplayError, TargetAnswer};
 use super::scheduler::work_limit::{Stopped, WorkMeter};
-use super::snapshot::{SessionSnapshot, SnapshotError};
 use super::targets::{Boxes, Correction, Estimates, StartError, Targets, TargetsError};
 use bagtrack_tracker::{BagEntry, Diagnostics, Expert, Frame, FrameFormat, Params, TrackerError};
 use std::sync::Arc;
@@ -11,10 +9,10 @@ use std::sync::Arc;
 /// The part of a session that changes from frame to frame.
 #[derive(Debug, Clone)]
 pub struct SessionState {
-    targets: Targets,
-    /// The answers to the last frames, oldest first: to those of the last request, and to so many before them as that
-    /// request asked for.
-    recent: Vec<Answered>,
+    pub(super) targets: Targets,
+    /// The answers to the last frames, oldest first, at least one: to those of the last request, and to so many before
+    /// them as that request asked for.
+    pub(super) recent: Vec<Answered>,
 }
 
 /// Why no frame of several was taken.
@@ -62,48 +60,6 @@ impl SessionState {
             targets: first,
         }];
         Ok(Self { targets, recent })
-    }
-
-    /// The session that a snapshot holds, with at most `max_recent` stored answers; `expert` is the one of this process.
-    ///
-    /// # Errors
-    /// See [`SnapshotError`].
-    pub fn restore(
-        snapshot: &[u8],
-        keys: &MacKeys,
-        max_recent: usize,
-        expert: Option<&Arc<dyn Expert>>,
-    ) -> Result<Self, SnapshotError> {
-        let SessionSnapshot { targets, recent } =
-            SessionSnapshot::decode(snapshot, keys, max_recent, expert)?;
-        Ok(Self { targets, recent })
-    }
-
-    /// The session as bytes, signed.
-    pub fn snapshot(&self, keys: &MacKeys) -> Vec<u8> {
-        SessionSnapshot::encode(&self.targets, &self.recent, keys)
-    }
-
-    /// The session that [`Self::stored`] wrote. What it has in common with `known`, the session at another frame, is
-    /// not computed again.
-    ///
-    /// # Errors
-    /// See [`SnapshotError`].
-    pub fn from_stored(
-        bytes: &[u8],
-        max_recent: usize,
-        expert: Option<&Arc<dyn Expert>>,
-        known: Option<&Self>,
-    ) -> Result<Self, SnapshotError> {
-        let known = known.map(|known| &known.targets);
-        let SessionSnapshot { targets, recent } =
-            SessionSnapshot::read(bytes, max_recent, expert, known)?;
-        Ok(Self { targets, recent })
-    }
-
-    /// The session as bytes for the store, which are not signed.
-    pub fn stored(&self) -> Vec<u8> {
-        SessionSnapshot::write(&self.targets, &self.recent)
     }
 
     /// The bag of a target, for people to look at; none if there is no such target.
