@@ -75,7 +75,7 @@ pub use session_permit::{LockedSession, SessionBusy, SessionClosed, SessionPermi
 pub use snapshot::{
     KEY_CONTEXT as SNAPSHOT_KEY_CONTEXT, MAGIC as SNAPSHOT_MAGIC, SnapshotError, is_snapshot,
 };
-pub use state::{SessionState, StepError};
+pub use state::SessionState;
 pub use store::{
     AddressError, Commit, Counted, Durability, DurabilityError, FileStore, FileStoreError, Outcome,
     Record, SessionName, SessionStore, StoreAddress, StoreFuture, StoreShare, StoreUnavailable,

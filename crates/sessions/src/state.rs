@@ -3,7 +3,7 @@
 use super::replay::{self, Answered, Fingerprint, ReplayDecision, ReplayError, TargetAnswer};
 use super::scheduler::work_limit::{Stopped, WorkMeter};
 use super::targets::{Boxes, Correction, Estimates, StartError, Targets, TargetsError};
-use bagtrack_tracker::{BagEntry, Diagnostics, Expert, Frame, FrameFormat, Params, TrackerError};
+use bagtrack_tracker::{BagEntry, Diagnostics, Expert, Frame, FrameFormat, Params};
 use std::sync::Arc;
 
 /// The part of a session that changes from frame to frame.
@@ -13,25 +13,6 @@ pub struct SessionState {
     /// The answers to the last frames, oldest first, at least one: to those of the last request, and to so many before
     /// them as that request asked for.
     pub(super) recent: Vec<Answered>,
-}
-
-/// Why no frame of several was taken.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum StepError<E> {
-    /// The tracker refused one of them.
-    #[error("frame {index}: {error}")]
-    Refused {
-        /// Which one, counted from 0.
-        index: usize,
-        /// Why.
-        error: TrackerError,
-    },
-    /// The work was stopped before all of them were taken.
-    #[error(transparent)]
-    Stopped(Stopped),
-    /// One of them cannot be had.
-    #[error(transparent)]
-    Frame(E),
 }
 
 impl SessionState {
@@ -142,49 +123,34 @@ impl SessionState {
     }
 
     /// Stores new answers, and of those before them as many as make `kept` together.
-    fn store(&mut self, answered: Vec<Answered>, kept: usize) {
+    pub(super) fn store(&mut self, answered: Vec<Answered>, kept: usize) {
         let older = kept.saturating_sub(answered.len()).min(self.recent.len());
         self.recent.drain(..self.recent.len() - older);
         self.recent.extend(answered);
     }
 
-    /// Tracks through frames with these digests in order; `frame` gives each in its turn. In the first one the user may
-    /// correct a target, which there must be. Between frames and targets `meter` says whether to go on. The answers are
-    /// stored, and at least the last `kept`. `seen` becomes what the trackers saw in the last frame.
+    /// Tracks through a frame with this digest, in which the user may correct a target, which there must be. Between
+    /// targets `meter` says whether to go on. The answer is to be [stored](Self::store). `seen` becomes what the trackers
+    /// saw.
     ///
     /// # Errors
-    /// A frame cannot be had, the tracker refused one or the box, or the work was stopped. Some frames may have been taken
-    /// then, so callers work on a copy.
-    pub fn advance<E>(
+    /// The tracker refused the frame or the box, or the work was stopped. Some targets may have taken the frame then, so
+    /// callers work on a copy.
+    pub(super) fn step(
         &mut self,
-        fingerprints: &[Fingerprint],
-        mut frame: impl FnMut(usize, &mut WorkMeter) -> Result<Frame, E>,
+        frame: Frame,
+        fingerprint: Fingerprint,
         correction: Option<Correction>,
         meter: &mut WorkMeter,
-        kept: usize,
-        mut seen: Option<&mut Vec<Diagnostics>>,
-    ) -> Result<Vec<Estimates>, StepError<E>> {
-        let mut answered = Vec::with_capacity(fingerprints.len());
-        for (index, fingerprint) in fingerprints.iter().enumerate() {
-            let frame = Arc::new(frame(index, meter).map_err(StepError::Frame)?);
-            let correction = correction.filter(|_| index == 0);
-            let seen = seen.as_deref_mut();
-            let advanced = self.targets.advance(&frame, correction, meter, seen);
-            // Where another worker is still about to let go of it, its memory is not used again.
-            if let Some(frame) = Arc::into_inner(frame) {
-                bagtrack_ingest::recycle(frame);
-            }
-            advanced.map_err(|error| match error {
-                TargetsError::Refused(error) => StepError::Refused { index, error },
-                TargetsError::Stopped(stopped) => StepError::Stopped(stopped),
-            })?;
-            answered.push(self.answered(*fingerprint, correction));
+        seen: Option<&mut Vec<Diagnostics>>,
+    ) -> Result<Answered, TargetsError> {
+        let frame = Arc::new(frame);
+        let advanced = self.targets.advance(&frame, correction, meter, seen);
+        // Where another worker is still about to let go of it, its memory is not used again.
+        if let Some(frame) = Arc::into_inner(frame) {
+            bagtrack_ingest::recycle(frame);
         }
-        let estimates = answered.iter().map(Answered::estimates).collect();
-        if !answered.is_empty() {
-            self.store(answered, kept);
-        }
-        Ok(estimates)
+        advanced.map(|()| self.answered(fingerprint, correction))
     }
 
     /// The answer to the frame with this digest, which was the last.

@@ -4,10 +4,10 @@
 use super::box_check;
 use super::error::{FrameFault, FramesError};
 use super::tracking_metrics::TrackingMetrics;
+use crate::replay::Answered;
 use crate::streams::StreamPlace;
-use crate::{
-    Correction, Estimates, Fingerprint, ReplayDecision, SessionState, StepError, WorkMeter,
-};
+use crate::targets::TargetsError;
+use crate::{Correction, Estimates, Fingerprint, ReplayDecision, SessionState, WorkMeter};
 use bagtrack_ingest::{Inspected, Limits};
 use bagtrack_tracker::{Diagnostics, Frame, FrameFormat, Rect, TrackerError};
 use bytes::Bytes;
@@ -125,31 +125,26 @@ impl FrameBatch {
                 checkpoint: None,
             });
         }
-        let mut inspected = self.inspect(limits, state.source_size())?.into_iter();
+        let inspected = self.inspect(limits, state.source_size())?;
         let format = state.frame_format();
         let before = state.latest();
         let mut diagnostics = Vec::new();
         let wanted = self.with_diagnostics && correction.is_none();
-        let seen = wanted.then_some(&mut diagnostics);
-        let frame = |index: usize, meter: &mut WorkMeter| {
-            let file = inspected.next().expect("each file was inspected");
+        let mut answered = Vec::with_capacity(inspected.len());
+        for (index, (file, fingerprint)) in inspected.into_iter().zip(fingerprints).enumerate() {
             meter.check()?;
-            let decoded = metrics.decoding(|| file.decode(format));
-            decoded.map_err(|error| self.fault(index, error))
-        };
-        let estimates = state.advance(
-            &fingerprints,
-            frame,
-            correction,
-            meter,
-            self.min_answers,
-            seen,
-        );
-        let estimates = estimates.map_err(|error| match error {
-            StepError::Refused { index, error } => self.fault(index, error),
-            StepError::Stopped(stopped) => stopped.into(),
-            StepError::Frame(error) => error,
-        })?;
+            let frame = metrics.decoding(|| file.decode(format));
+            let frame = frame.map_err(|error| self.fault(index, error))?;
+            let correction = correction.filter(|_| index == 0);
+            let seen = wanted.then_some(&mut diagnostics);
+            let step = state.step(frame, fingerprint, correction, meter, seen);
+            answered.push(step.map_err(|error| match error {
+                TargetsError::Refused(error) => self.fault(index, error),
+                TargetsError::Stopped(stopped) => stopped.into(),
+            })?);
+        }
+        let estimates: Vec<Estimates> = answered.iter().map(Answered::estimates).collect();
+        state.store(answered, self.min_answers);
         metrics.tracked(&before, &estimates, &meter.take_steps());
         Ok(Tracked {
             estimates,
