@@ -9,7 +9,7 @@ use crate::streams::StreamPlace;
 use crate::targets::TargetsError;
 use crate::{Correction, Estimates, Fingerprint, ReplayDecision, SessionState, WorkMeter};
 use bagtrack_ingest::{Inspected, Limits};
-use bagtrack_tracker::{Diagnostics, Frame, FrameFormat, Rect, TrackerError};
+use bagtrack_tracker::{Diagnostics, Rect, TrackerError};
 use bytes::Bytes;
 use std::sync::Arc;
 
@@ -244,22 +244,4 @@ fn pixels(inspected: &[Inspected]) -> u64 {
     sizes
         .map(|(width, height)| u64::from(width) * u64::from(height))
         .sum()
-}
-
-/// Decodes a file in the format that `format` says for uploads of a size, where `meter` says that the work goes on.
-///
-/// # Errors
-/// That of the file, which is the one of this index of so many; or that the work was stopped.
-pub(super) fn decode(
-    file: &Bytes,
-    (index, count): (usize, usize),
-    limits: &Limits,
-    format: &dyn Fn((u32, u32)) -> FrameFormat,
-    meter: &mut WorkMeter,
-    metrics: &TrackingMetrics,
-) -> Result<Frame, FramesError> {
-    meter.check()?;
-    metrics
-        .decoding(|| bagtrack_ingest::decode_to(file, limits, format))
-        .map_err(|error| fault_of(index, count, error))
 }

@@ -1,10 +1,9 @@
 //! What a session begins with.
 
 use super::box_check;
-use super::error::OpenError;
-use super::frames;
+use super::error::{FrameFault, FramesError, OpenError};
 use super::service::SessionService;
-use crate::{Boxes, Fingerprint, PerTarget, SessionState, Stopped, WorkMeter, frame_format};
+use crate::{Boxes, Fingerprint, PerTarget, SessionState, StartError, WorkMeter, frame_format};
 use bagtrack_tracker::Params;
 use bytes::Bytes;
 
@@ -65,9 +64,11 @@ impl Start {
                 params,
             } => (file, boxes, params),
         };
+        meter.check()?;
         let format = |source| frame_format(params, source, boxes);
-        let limits = &service.settings.frame;
-        let frame = &frames::decode(file, (0, 1), limits, &format, meter, &service.tracking)?;
+        let decode = || bagtrack_ingest::decode_to(file, &service.settings.frame, &format);
+        let decoded = service.tracking.decoding(decode);
+        let frame = &decoded.map_err(|error| FramesError::from(FrameFault::Ingest(error)))?;
         for (target, given) in boxes.as_slice().iter().enumerate() {
             box_check::check(given, frame.source_size()).map_err(|error| OpenError::Box {
                 error,
@@ -88,7 +89,7 @@ impl Start {
             check,
         );
         started.map_err(|error| match error {
-            crate::StartError::Stopped(stopped) => Stopped::into(stopped),
+            StartError::Stopped(stopped) => stopped.into(),
             error => OpenError::Start {
                 error,
                 listed: match boxes {
