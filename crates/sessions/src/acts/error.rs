@@ -226,14 +226,11 @@ macro_rules! through {
 }
 
 through!(Stopped => Act in FramesError);
-through!(WorkPanicked => Act in FramesError);
 through!(StoreUnavailable => Act in FramesError);
 through!(SessionBusy => Act in FramesError);
 through!(SessionClosed => Act in FramesError);
 through!(QueueFull => Act in FramesError);
 through!(Stopped => Act in OpenError);
-through!(WorkPanicked => Act in OpenError);
 through!(StoreUnavailable => Act in OpenError);
 through!(TooManySessions => Act in OpenError);
-through!(Stopped => Frames in TrackError);
-through!(WorkPanicked => Frames in TrackError);
+through!(ActError => Frames in TrackError);

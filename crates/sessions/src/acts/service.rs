@@ -1,12 +1,13 @@
 //! What the acts share: the parts of the service, and work on its worker threads.
 
+use super::error::ActError;
 use super::idempotency::IdempotencyStore;
 use super::tracking_metrics::TrackingMetrics;
 use crate::clock::{self, timeout};
 use crate::streams::OpenStreams;
 use crate::{
     Admission, MacKeys, NoOutcome, QueuePermit, Registry, SessionStore, Stopped, WorkLimit,
-    WorkMeter, WorkPanicked,
+    WorkMeter,
 };
 use bagtrack_tracker::Expert;
 use metrics::Histogram;
@@ -100,7 +101,7 @@ impl SessionService {
     pub async fn run<T, E, F>(&self, queue: QueuePermit, work: F) -> Result<T, E>
     where
         T: Send + 'static,
-        E: From<Stopped> + From<WorkPanicked> + Send + 'static,
+        E: From<ActError> + Send + 'static,
         F: FnOnce(&mut WorkMeter) -> Result<T, E> + Send + 'static,
     {
         let deadline = clock::now() + self.settings.work_timeout;
@@ -113,11 +114,12 @@ impl SessionService {
             waited.record(asked.elapsed().as_secs_f64());
             work(&mut limit.start(turn))
         });
-        match timeout(self.settings.work_timeout, work).await {
-            Ok(Ok(done)) => done,
-            Ok(Err(NoOutcome::Overload)) => Err(Stopped::Overload.into()),
-            Ok(Err(NoOutcome::Panicked(panicked))) => Err(panicked.into()),
-            Err(_) => Err(Stopped::Deadline.into()),
-        }
+        let error: ActError = match timeout(self.settings.work_timeout, work).await {
+            Ok(Ok(done)) => return done,
+            Ok(Err(NoOutcome::Overload)) => Stopped::Overload.into(),
+            Ok(Err(NoOutcome::Panicked(panicked))) => panicked.into(),
+            Err(_) => Stopped::Deadline.into(),
+        };
+        Err(error.into())
     }
 }

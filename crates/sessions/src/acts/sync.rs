@@ -10,7 +10,7 @@ use crate::planted::PlantedFault;
 use crate::store::{Commit, Gone, Intent, Outcome, Step, StoreUnavailable, reconcile};
 use crate::{
     Flow, LockedSession, NoSession, QueuePermit, Session, SessionBusy, SessionPermit, SessionState,
-    Stopped, WorkMeter, WorkPanicked,
+    Stopped, WorkMeter,
 };
 use std::sync::Arc;
 use std::time::Duration;
@@ -45,12 +45,13 @@ impl SessionService {
     ) -> Result<T, E>
     where
         T: Send + 'static,
-        E: From<ActError> + From<Stopped> + From<WorkPanicked> + Send + 'static,
+        E: From<ActError> + Send + 'static,
         F: FnOnce(&SessionState) -> Result<T, E> + Send + 'static,
     {
         let newest = self.lock_newest(permit, queue.flow(), false);
         let newest = timeout(self.settings.work_timeout, newest).await;
-        let mut locked = newest.map_err(|_| Stopped::Deadline)??;
+        let newest = newest.map_err(|_| ActError::from(Stopped::Deadline))?;
+        let mut locked = newest?;
         self.run(queue, move |_: &mut WorkMeter| read(locked.state()))
             .await
     }

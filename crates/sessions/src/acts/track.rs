@@ -2,11 +2,11 @@
 
 use super::advance::largest;
 use super::box_check::box_warnings;
-use super::error::TrackError;
+use super::error::{ActError, TrackError};
 use super::frames::{FrameBatch, GivenBox, RequestLimits, check_pixels};
 use super::service::SessionService;
 use super::start::Start;
-use crate::{Boxes, Estimates, QueuePermit, SessionState, Stopped, WorkMeter, WorkPanicked};
+use crate::{Boxes, Estimates, QueuePermit, SessionState, WorkMeter};
 use bagtrack_tracker::Params;
 use bytes::Bytes;
 
@@ -44,7 +44,7 @@ impl SessionService {
     ) -> Result<T, E>
     where
         T: Send + 'static,
-        E: From<TrackError> + From<Stopped> + From<WorkPanicked> + Send + 'static,
+        E: From<TrackError> + From<ActError> + Send + 'static,
         F: FnOnce(TrackedAway) -> Result<T, E> + Send + 'static,
     {
         let service = self.clone();
