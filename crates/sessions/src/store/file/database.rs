@@ -122,7 +122,7 @@ pub(super) struct Database {
     /// Has handles of the others, so it is waited for before they are dropped.
     compaction: Option<JoinHandle<()>>,
     is_closing: Arc<AtomicBool>,
-    tables: Tables,
+    pub(super) tables: Tables,
     inner: SingleWriterTxDatabase,
     /// Of what is in memory and not in tables yet.
     written_bytes: u64,
@@ -239,11 +239,8 @@ impl Database {
         Transaction {
             inner: self.inner.write_tx(),
             database: self,
-            tables: &self.tables,
             now,
-            promises: false,
-            written_bytes: 0,
-            dropped_bytes: 0,
+            written: Written::default(),
         }
     }
 
@@ -286,10 +283,10 @@ impl Database {
             if let Ok(row) = Row::from_bytes(&row)
                 && row.expires <= now
             {
-                sweep.dropped_bytes += row.state_bytes;
+                sweep.written.dropped_bytes += row.state_bytes;
                 sweep.inner.remove(&self.tables.rows, id.clone());
                 sweep.inner.remove(&self.tables.states, id);
-                sweep.written_bytes += 2 * ENTRY_BYTES;
+                sweep.written.bytes += 2 * ENTRY_BYTES;
                 rows += 1;
             }
             if rows == SWEPT_ROWS {
@@ -305,7 +302,7 @@ impl Database {
                 let (key, until) = entry.into_inner()?;
                 if moment(&until).is_none_or(|until| until <= now) {
                     sweep.inner.remove(table, key);
-                    sweep.written_bytes += ENTRY_BYTES;
+                    sweep.written.bytes += ENTRY_BYTES;
                     marks += 1;
                 }
             }
@@ -322,9 +319,9 @@ impl Database {
 
     /// Counts what was written. What is much goes to tables, and space that is not used is given back.
     pub(super) fn account(&mut self, written: &Written) -> fjall::Result<()> {
-        self.written_bytes += written.written_bytes;
+        self.written_bytes += written.bytes;
         self.dropped_bytes += written.dropped_bytes;
-        if written.written_bytes > 0 && self.written_bytes >= MEMTABLE_BYTES {
+        if written.bytes > 0 && self.written_bytes >= MEMTABLE_BYTES {
             self.written_bytes = 0;
             // All of them, so that the journal up to here can go.
             for table in self.tables.all() {
@@ -361,35 +358,26 @@ impl Database {
 pub(super) struct Transaction<'a> {
     pub(super) inner: SingleWriterWriteTx<'a>,
     pub(super) database: &'a Database,
-    pub(super) tables: &'a Tables,
     /// Milliseconds of the folder's time.
     pub(super) now: u64,
+    pub(super) written: Written,
+}
+
+/// What a transaction writes.
+#[derive(Default)]
+pub(super) struct Written {
     /// Whether an answer promises something that is written here.
     pub(super) promises: bool,
     /// Of what was written.
-    pub(super) written_bytes: u64,
+    pub(super) bytes: u64,
     /// Of the states that were dropped.
-    pub(super) dropped_bytes: u64,
-}
-
-/// What was written.
-pub(super) struct Written {
-    /// See [`Transaction::promises`].
-    pub(super) promises: bool,
-    /// See [`Transaction::written_bytes`].
-    pub(super) written_bytes: u64,
-    /// See [`Transaction::dropped_bytes`].
     pub(super) dropped_bytes: u64,
 }
 
 impl Transaction<'_> {
     pub(super) fn write(self, mode: PersistMode) -> fjall::Result<Written> {
         self.inner.durability(Some(mode)).commit()?;
-        Ok(Written {
-            promises: self.promises,
-            written_bytes: self.written_bytes,
-            dropped_bytes: self.dropped_bytes,
-        })
+        Ok(self.written)
     }
 }
 

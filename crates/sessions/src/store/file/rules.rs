@@ -55,7 +55,7 @@ impl Transaction<'_> {
 
     /// The row of this id, if its time is not over. One that is damaged is lost.
     fn row(&mut self, id: Uuid) -> Result<Option<Row>, Fault> {
-        let bytes = self.inner.get(&self.tables.rows, id.as_bytes());
+        let bytes = self.inner.get(&self.database.tables.rows, id.as_bytes());
         let row = bytes
             .map_err(Fault::from)
             .and_then(|bytes| Ok(bytes.map(|bytes| Row::from_bytes(&bytes)).transpose()?));
@@ -94,25 +94,30 @@ impl Transaction<'_> {
 
     fn put(&mut self, id: Uuid, row: &Row) {
         let bytes = row.to_bytes();
-        self.written_bytes += bytes.len() as u64;
-        self.inner.insert(&self.tables.rows, *id.as_bytes(), bytes);
+        self.written.bytes += bytes.len() as u64;
+        self.inner
+            .insert(&self.database.tables.rows, *id.as_bytes(), bytes);
     }
 
     /// The state of a session, after the number of its frame.
     fn put_state(&mut self, id: Uuid, frame: u64, state: &[u8]) {
         let bytes = with_frame(frame, state);
-        self.written_bytes += bytes.len() as u64;
+        self.written.bytes += bytes.len() as u64;
         self.inner
-            .insert(&self.tables.states, *id.as_bytes(), bytes);
+            .insert(&self.database.tables.states, *id.as_bytes(), bytes);
     }
 
     fn drop_session(&mut self, id: Uuid) {
-        self.inner.remove(&self.tables.rows, *id.as_bytes());
-        self.inner.remove(&self.tables.states, *id.as_bytes());
+        self.inner
+            .remove(&self.database.tables.rows, *id.as_bytes());
+        self.inner
+            .remove(&self.database.tables.states, *id.as_bytes());
     }
 
     fn has_ended(&self, name: SessionName) -> Result<bool, Fault> {
-        let ended = self.inner.get(&self.tables.ended, ended_key(name))?;
+        let ended = self
+            .inner
+            .get(&self.database.tables.ended, ended_key(name))?;
         let until = ended.and_then(|bytes| moment(&bytes));
         Ok(until.is_some_and(|until| until > self.now))
     }
@@ -131,7 +136,9 @@ impl Transaction<'_> {
     }
 
     fn read_record(&self, id: Uuid, row: &Row) -> Result<Record, Fault> {
-        let state = self.inner.get(&self.tables.states, id.as_bytes())?;
+        let state = self
+            .inner
+            .get(&self.database.tables.states, id.as_bytes())?;
         Ok(row.record(state.as_deref(), self.now)?)
     }
 
@@ -147,7 +154,7 @@ impl Transaction<'_> {
         };
         if goes_back {
             self.put(id, &row);
-            self.promises = true;
+            self.written.promises = true;
         }
         Ok(Outcome::Conflict(Box::new(record)))
     }
@@ -169,7 +176,7 @@ impl Transaction<'_> {
         }
         self.put(id, &Row::of(record, self.expiry(record.ttl)));
         self.put_state(id, record.version.frame, &record.state);
-        self.promises = true;
+        self.written.promises = true;
         Ok(Outcome::Committed(record.ttl))
     }
 
@@ -196,7 +203,7 @@ impl Transaction<'_> {
             self.put_state(id, commit.frame, state);
         }
         self.put(id, &row);
-        self.promises = true;
+        self.written.promises = true;
         Ok(Outcome::Committed(commit.ttl))
     }
 
@@ -229,7 +236,7 @@ impl Transaction<'_> {
         }
         row.generation += 1;
         self.put(name.id, &row);
-        self.promises = true;
+        self.written.promises = true;
         Ok(Outcome::Committed(self.time_left(&row)))
     }
 
@@ -245,14 +252,14 @@ impl Transaction<'_> {
             None => !self.has_ended(name)?,
         };
         if is_own != Some(false) {
-            self.dropped_bytes += row.map_or(0, |row| row.state_bytes);
+            self.written.dropped_bytes += row.map_or(0, |row| row.state_bytes);
             self.drop_session(name.id);
         }
         let until = self.expiry(ttl).to_be_bytes();
-        self.written_bytes += ENTRY_BYTES;
+        self.written.bytes += ENTRY_BYTES;
         self.inner
-            .insert(&self.tables.ended, ended_key(name), until);
-        self.promises = true;
+            .insert(&self.database.tables.ended, ended_key(name), until);
+        self.written.promises = true;
         Ok(is_here)
     }
 
@@ -266,16 +273,16 @@ impl Transaction<'_> {
 
     /// What the store has noted of itself under this name.
     pub(super) fn note<const N: usize>(&self, name: &str) -> fjall::Result<Option<[u8; N]>> {
-        let note = self.inner.get(&self.tables.notes, name)?;
+        let note = self.inner.get(&self.database.tables.notes, name)?;
         Ok(note.and_then(|bytes| bytes.get(8..)?.try_into().ok()))
     }
 
     pub(super) fn put_note(&mut self, name: &str, value: &[u8]) {
         let bytes = [&NEVER.to_be_bytes(), value].concat();
-        self.written_bytes += bytes.len() as u64;
+        self.written.bytes += bytes.len() as u64;
         self.inner
-            .insert(&self.tables.notes, name.as_bytes(), bytes);
-        self.promises = true;
+            .insert(&self.database.tables.notes, name.as_bytes(), bytes);
+        self.written.promises = true;
     }
 }
 
@@ -298,7 +305,7 @@ mod tests {
             assert!(transaction.end(name, ttl).unwrap());
         }
         let written = transaction.write(PersistMode::Buffer).unwrap();
-        assert!(written.written_bytes > 1500 * 32);
+        assert!(written.bytes > 1500 * 32);
         assert!(!database.sweep(9).unwrap(), "their time is not over");
         assert!(database.sweep(10).unwrap(), "there are more");
         assert!(!database.sweep(10).unwrap());

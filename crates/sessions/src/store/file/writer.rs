@@ -187,7 +187,7 @@ impl Writer {
                 failures += u64::from(!call.run(&mut transaction));
             }
             let mode = match durability {
-                Durability::Each if transaction.promises => PersistMode::SyncData,
+                Durability::Each if transaction.written.promises => PersistMode::SyncData,
                 _ => PersistMode::Buffer,
             };
             let written = transaction.write(mode)?;
