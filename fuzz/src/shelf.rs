@@ -2,8 +2,9 @@
 
 use crate::service::{content_of_stored, stored_of};
 use bagtrack_sessions::{
-    record_of_row, row_and_state, Clock, Commit, NewHash, Outcome, Record, RedisStore,
-    ScriptServer, SessionName, SessionState, SessionStore, StoreFuture, StoreUnavailable, Version,
+    record_of_row, row_and_state, Clock, Commit, NewHash, Outcome, Record, RedisAddress,
+    RedisStore, ScriptServer, SessionName, SessionState, SessionStore, StoreFuture,
+    StoreUnavailable, Version,
 };
 use redis::{RedisFuture, Value};
 use std::io;
@@ -146,8 +147,8 @@ impl ScriptServer for Server {
 impl Shelf {
     pub async fn new() -> Self {
         let stored = Place::default();
-        let server = Arc::new(Server(stored.clone()));
-        let redis = RedisStore::behind(server, "fuzz", LONG, Clock::default()).await;
+        let address = RedisAddress::of(Arc::new(Server(stored.clone())));
+        let redis = RedisStore::connect(address, "fuzz", LONG, Clock::default()).await;
         Self {
             stored,
             written: Arc::default(),

@@ -11,7 +11,7 @@ use axum::body::Body;
 use bagtrack::http::{Config, ConnectionService, Parts, Service};
 use bagtrack_net::{ConnectionHold, Connections};
 use bagtrack_sessions::clock::{Instant, now, sleep, timeout};
-use bagtrack_sessions::{Clock, Executor, RedisStore, SessionStore};
+use bagtrack_sessions::{Clock, Executor, RedisAddress, RedisStore, SessionStore};
 use bytes::Bytes;
 use http::{Request, Response};
 use http_body_util::BodyExt;
@@ -208,7 +208,8 @@ async fn store(
         chance: setup.chance.clone(),
         trace: setup.trace.clone(),
     };
-    let store = RedisStore::behind(Arc::new(line), "sim", STORE_TIMEOUT, clock.clone()).await;
+    let address = RedisAddress::of(Arc::new(line));
+    let store = RedisStore::connect(address, "sim", STORE_TIMEOUT, clock.clone()).await;
     Arc::new(store.expect("the address can be used"))
 }
 

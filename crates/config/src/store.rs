@@ -74,7 +74,7 @@ impl StoreConfig {
             }
             #[cfg(feature = "redis")]
             Some(StoreAddress::Redis(address)) => {
-                let store = RedisStore::connect(address, &self.store_prefix, timeout).await;
+                let store = RedisStore::connect(address, &self.store_prefix, timeout, clock).await;
                 let store = store.inspect_err(|error| tracing::error!(%error, "no store"));
                 store.ok().map(|store| Arc::new(store) as _)
             }

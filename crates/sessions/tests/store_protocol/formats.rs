@@ -104,7 +104,11 @@ fn file_store(folder: &Path) -> Arc<FileStore> {
 async fn redis_store(redis: &Redis) -> Arc<RedisStore> {
     let address = format!("redis://127.0.0.1:{}", redis.port);
     let address = RedisAddress::parse(&address, LONG).unwrap();
-    Arc::new(RedisStore::connect(address, "formats", LONG).await.unwrap())
+    Arc::new(
+        RedisStore::connect(address, "formats", LONG, Clock::default())
+            .await
+            .unwrap(),
+    )
 }
 
 /// What a release has written.

@@ -3,7 +3,8 @@
 use crate::folder::Known;
 use crate::suite::{TTL, holds_for, is_committed, record, told};
 use bagtrack_sessions::{
-    Commit, Counted, Outcome, RedisAddress, RedisStore, SessionName, SessionStore, StoreShare,
+    Clock, Commit, Counted, Outcome, RedisAddress, RedisStore, SessionName, SessionStore,
+    StoreShare,
 };
 use bagtrack_testing::processes::{Process, free_port, redis_server};
 use bytes::Bytes;
@@ -56,7 +57,7 @@ impl Redis {
 
 async fn store_at(port: u16, timeout: Duration) -> RedisStore {
     let address = RedisAddress::parse(&format!("redis://127.0.0.1:{port}"), timeout).unwrap();
-    let store = RedisStore::connect(address, "suite", timeout);
+    let store = RedisStore::connect(address, "suite", timeout, Clock::default());
     store.await.unwrap()
 }
 
@@ -329,7 +330,9 @@ async fn a_redis_that_has_refused_a_password_is_found_again_when_it_takes_it() {
     let url = format!("redis://:the-password@127.0.0.1:{}", redis.port);
     set("the-password");
     let address = RedisAddress::parse(&url, SHORT).unwrap();
-    let store = RedisStore::connect(address, "suite", SHORT).await.unwrap();
+    let store = RedisStore::connect(address, "suite", SHORT, Clock::default())
+        .await
+        .unwrap();
     let mut session = Known::create(&store, 1, TTL).await;
 
     let client = redis::Client::open(url).unwrap();

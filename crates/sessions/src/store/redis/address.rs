@@ -62,6 +62,11 @@ impl RedisAddress {
             .build();
         Ok(Self(Kind::Cluster(Box::new(cluster.map_err(failed)?))))
     }
+
+    /// That of what stands in for a Redis.
+    pub fn of(server: Arc<dyn ScriptServer>) -> Self {
+        Self(Kind::Given(server))
+    }
 }
 
 impl std::fmt::Debug for RedisAddress {

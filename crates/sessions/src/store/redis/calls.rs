@@ -4,9 +4,9 @@ use super::super::record::{Record, SessionName, Version};
 use super::super::session_store::{
     Commit, Counted, Outcome, SessionStore, StoreFuture, StoreShare, StoreUnavailable,
 };
-use super::address::{Kind, RedisAddress};
+use super::address::RedisAddress;
 use super::connection::Connection;
-use super::script::{NewHash, Script, ScriptCall, ScriptServer};
+use super::script::{NewHash, Script, ScriptCall};
 use super::scripts::Scripts;
 use crate::clock::{Clock, sleep};
 use crate::random::random;
@@ -105,33 +105,12 @@ impl FromRedisValue for Answer {
 }
 
 impl RedisStore {
-    /// The store at this address. The keys of its records begin with `prefix`. Calls end after `timeout`. It waits for
-    /// the first answer, and goes on without one.
+    /// The store at this address. The keys of its records begin with `prefix`. Calls end after `timeout`; what it counts of
+    /// clients is as old as `clock` says. It waits for the first answer, and goes on without one.
     ///
     /// # Errors
     /// The address cannot be used.
     pub async fn connect(
-        address: RedisAddress,
-        prefix: &str,
-        timeout: Duration,
-    ) -> Result<Self, StoreUnavailable> {
-        Self::connect_at(address, prefix, timeout, Clock::default()).await
-    }
-
-    /// The same, with what stands in for a Redis, and this clock.
-    ///
-    /// # Errors
-    /// None.
-    pub async fn behind(
-        server: Arc<dyn ScriptServer>,
-        prefix: &str,
-        timeout: Duration,
-        clock: Clock,
-    ) -> Result<Self, StoreUnavailable> {
-        Self::connect_at(RedisAddress(Kind::Given(server)), prefix, timeout, clock).await
-    }
-
-    async fn connect_at(
         address: RedisAddress,
         prefix: &str,
         timeout: Duration,
