@@ -125,3 +125,8 @@ pub trait SessionStore: Debug + Send + Sync {
         0
     }
 }
+
+/// A time as stores have it: in whole milliseconds, at least one.
+pub(super) fn milliseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_millis()).unwrap_or(u64::MAX).max(1)
+}

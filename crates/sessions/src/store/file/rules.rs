@@ -1,7 +1,7 @@
 //! What each call does to the database, inside of a transaction.
 
 use super::super::record::{Record, SessionName, UnreadableRecord, Version};
-use super::super::session_store::{Commit, Outcome};
+use super::super::session_store::{Commit, Outcome, milliseconds};
 use super::database::{ENTRY_BYTES, Transaction, moment};
 use super::row::{Row, with_frame};
 use fjall::Readable;
@@ -42,10 +42,6 @@ fn ended_key(name: SessionName) -> [u8; 24] {
     key[..16].copy_from_slice(name.id.as_bytes());
     key[16..].copy_from_slice(&name.incarnation.to_be_bytes());
     key
-}
-
-fn milliseconds(time: Duration) -> u64 {
-    u64::try_from(time.as_millis()).unwrap_or(u64::MAX).max(1)
 }
 
 impl Transaction<'_> {

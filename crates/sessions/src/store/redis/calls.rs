@@ -2,7 +2,7 @@
 
 use super::super::record::{Record, SessionName, Version};
 use super::super::session_store::{
-    Commit, Counted, Outcome, SessionStore, StoreFuture, StoreShare, StoreUnavailable,
+    Commit, Counted, Outcome, SessionStore, StoreFuture, StoreShare, StoreUnavailable, milliseconds,
 };
 use super::address::RedisAddress;
 use super::connection::Connection;
@@ -359,10 +359,6 @@ impl SessionStore for RedisStore {
 /// A name for one write.
 fn token() -> String {
     format!("{:016x}", random::<u64>())
-}
-
-fn milliseconds(time: Duration) -> u64 {
-    u64::try_from(time.as_millis()).unwrap_or(u64::MAX).max(1)
 }
 
 impl std::fmt::Debug for RedisStore {
