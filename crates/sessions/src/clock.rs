@@ -64,11 +64,15 @@ impl Clock {
 
     /// The wall-clock time of a moment of this clock; none before 1970, which machines without a battery begin in.
     pub fn wall(&self, moment: Duration) -> SystemTime {
+        SystemTime::UNIX_EPOCH + self.since_1970(moment)
+    }
+
+    /// The same as the time since the beginning of 1970.
+    pub(crate) fn since_1970(&self, moment: Duration) -> Duration {
         let now = self.now();
         let advanced = Duration::from_millis(self.advanced_ms.load(Ordering::Relaxed));
         let since_1970 = (self.wall)().duration_since(SystemTime::UNIX_EPOCH);
         let wall_now = since_1970.unwrap_or_default() + advanced;
-        let wall = (wall_now + moment).saturating_sub(now);
-        SystemTime::UNIX_EPOCH + wall
+        (wall_now + moment).saturating_sub(now)
     }
 }

@@ -9,7 +9,7 @@ use super::session::{NewSession, Session};
 use super::state::SessionState;
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 use uuid::Uuid;
 
 /// Of the sessions in the map, one in so many goes where there is no room.
@@ -39,12 +39,11 @@ impl Registry {
 
     /// How a session is opened now, by a request with this digest.
     pub fn opening(&self, request: [u8; 32], state: &SessionState) -> Opening {
-        let expires = self.clock.wall(self.clock.now() + self.first_lease());
-        let expires = expires.duration_since(SystemTime::UNIX_EPOCH);
+        let expires = self.clock.now() + self.first_lease();
         Opening {
             request,
             estimates: state.latest(),
-            expires: expires.map_or(0, |time| time.as_secs()),
+            expires: self.clock.since_1970(expires).as_secs(),
             incarnation: random(),
         }
     }
@@ -58,7 +57,7 @@ impl Registry {
         if self.evicts && self.len() >= self.max_sessions {
             self.evict();
         }
-        let full = TooManySessions(self.max_sessions);
+        let full = self.full();
         let held = (new.held, self.hold(&new.state).ok_or(full)?);
         let held: Reservation = Box::new(held);
         new.held = held;

@@ -89,7 +89,7 @@ impl Registry {
             self.sweep();
         }
         if self.len() >= self.max_sessions && !self.evicts {
-            return Err(TooManySessions(self.max_sessions));
+            return Err(self.full());
         }
         Ok(())
     }

@@ -5,7 +5,7 @@
 //! a restart it goes on by the wall clock, and the time between counts.
 
 use crate::clock::Clock;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 /// The name of the note of it.
 pub(super) const CLOCK: &str = "clock";
@@ -82,10 +82,7 @@ impl Time {
 
 /// Milliseconds since 1970 by the wall clock.
 fn wall(clock: &Clock) -> i64 {
-    let since = clock
-        .wall(clock.now())
-        .duration_since(SystemTime::UNIX_EPOCH);
-    milliseconds(since.unwrap_or_default())
+    milliseconds(clock.since_1970(clock.now()))
 }
 
 /// Milliseconds since the clock's beginning.

@@ -14,7 +14,7 @@ use redis::FromRedisValue;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 use uuid::Uuid;
 
 /// How long a state stays in the server where the script that commits it did not run.
@@ -139,10 +139,7 @@ impl RedisStore {
     /// Milliseconds since 1970.
     fn now(&self) -> u64 {
         let clock = &self.0.clock;
-        let since = clock
-            .wall(clock.now())
-            .duration_since(SystemTime::UNIX_EPOCH);
-        milliseconds(since.unwrap_or_default())
+        milliseconds(clock.since_1970(clock.now()))
     }
 
     /// Of a record. Braces make a cluster keep the keys of a session at one node.
