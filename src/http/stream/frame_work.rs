@@ -5,15 +5,15 @@ use super::waiting::{Arrived, ArrivedFrame, Waiting};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::overrides::rect;
 use crate::http::problems::problem::Problem;
+use crate::http::respond::answer::{particles, stream_answer};
 use crate::http::state::AppState;
-use bagtrack_api::ProblemKind as Kind;
+use bagtrack_api::{ProblemKind as Kind, StreamAnswer};
 use bagtrack_quotas::Account;
 use bagtrack_sessions::clock::{self, Instant, sleep, timeout_at};
 use bagtrack_sessions::{
-    ActError, Estimates, FrameBatch, FramesError, KEPT_ANSWERS, QueueFull, QueuePermit, Session,
-    SessionBusy, SessionPermit, StreamPlace, Tracked, box_warnings,
+    ActError, FrameBatch, FramesError, KEPT_ANSWERS, QueueFull, QueuePermit, Session, SessionBusy,
+    SessionPermit, StreamPlace, box_warnings,
 };
-use bagtrack_tracker::Diagnostics;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use uuid::Uuid;
@@ -33,24 +33,11 @@ pub struct FrameWork {
     pub waiting: Mutex<Waiting>,
 }
 
-/// The answer to a frame.
-#[derive(Debug)]
-pub struct Given {
-    pub estimates: Estimates,
-    /// Whether it was given before.
-    pub replayed: bool,
-    /// What the tracker of the target saw that was asked for.
-    pub seen: Option<Diagnostics>,
-    /// What may be wrong with the box that came with it.
-    pub warnings: Option<Vec<String>>,
-    /// The last frame whose state is in the store.
-    pub checkpoint: Option<u64>,
-}
-
 /// What became of a frame.
 #[derive(Debug)]
 pub struct Done {
-    pub answer: Result<Given, Problem>,
+    /// Its answer, without what is known when it is sent.
+    pub answer: Result<StreamAnswer, Problem>,
     /// Frames before it that were skipped.
     pub skipped: u64,
 }
@@ -138,7 +125,7 @@ impl FrameWork {
         self: &Arc<Self>,
         frame: ArrivedFrame,
         (mut session, mut queue): (SessionPermit, QueuePermit),
-    ) -> Result<Given, Problem> {
+    ) -> Result<StreamAnswer, Problem> {
         let ArrivedFrame { header, file } = frame;
         if self.waiting().newest_wins() && header.frame.is_some() {
             let detail = "With drop=true frames are skipped, so they have no numbers.";
@@ -168,7 +155,12 @@ impl FrameWork {
                 Ok(answered) => {
                     let given = header.rect.map(rect);
                     let warnings = box_warnings(given.as_slice(), at.source_size());
-                    return Ok(Given::of(answered, shown, warnings));
+                    return Ok(StreamAnswer {
+                        replayed: answered.replayed,
+                        checkpoint: answered.checkpoint,
+                        seen: answered.diagnostics.into_iter().nth(shown).map(particles),
+                        ..stream_answer(&answered.estimates[0], warnings)
+                    });
                 }
                 Err(FramesError::Act(ActError::Store(_))) if clock::now() < deadline => {
                     // The store may have the frame, and only its answer was lost.
@@ -178,21 +170,6 @@ impl FrameWork {
                 }
                 Err(error) => return Err(error.into()),
             }
-        }
-    }
-}
-
-impl Given {
-    /// The answer to one frame, with what the tracker of this target saw.
-    fn of(mut answered: Tracked, target: usize, warnings: Option<Vec<String>>) -> Self {
-        let seen =
-            (target < answered.diagnostics.len()).then(|| answered.diagnostics.swap_remove(target));
-        Self {
-            estimates: answered.estimates.swap_remove(0),
-            replayed: answered.replayed,
-            seen,
-            warnings,
-            checkpoint: answered.checkpoint,
         }
     }
 }

@@ -7,7 +7,7 @@ use super::upgrade::Socket;
 use super::waiting::ArrivedFrame;
 use crate::http::extract::instance::Instance;
 use crate::http::problems::problem::Problem;
-use crate::http::respond::answer::{particles, stream_answer};
+use crate::http::respond::answer::stream_answer;
 use axum::body::Bytes;
 use bagtrack_api::ProblemKind as Kind;
 use bagtrack_api::{FrameHeader, Hello, StreamAnswer};
@@ -215,15 +215,12 @@ impl SessionStream {
         }
         counts.skipped += skipped;
         match answer {
-            Ok(given) => {
+            Ok(answer) => {
                 counts.answered += 1;
                 let answer = StreamAnswer {
                     skipped,
-                    replayed: given.replayed,
-                    checkpoint: given.checkpoint,
                     draining: self.work.state.is_draining(),
-                    seen: given.seen.map(particles),
-                    ..stream_answer(&given.estimates, given.warnings)
+                    ..answer
                 };
                 self.send(socket, &answer).await?;
             }
