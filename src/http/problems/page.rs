@@ -1,7 +1,6 @@
 //! `/docs/problems`: the page that the types of problems lead to, with a section for each kind.
 
 use bagtrack_api::ProblemKind as Kind;
-use std::fmt::Write;
 
 const HEAD: &str = r#"<!doctype html>
 <html lang="en">
@@ -27,38 +26,24 @@ in the log. Bad input changes no session. All calls are at <a href="./">/docs</a
 
 pub fn page() -> String {
     let mut page = HEAD.to_owned();
-    page.push_str("<nav><ul>\n");
+    page += "<nav><ul>\n";
     for kind in Kind::ALL {
         let (slug, status) = (kind.slug(), kind.status());
-        line(
-            &mut page,
-            format_args!("<li><a href=\"#{slug}\">{status} {slug}</a></li>"),
-        );
+        page += &format!("<li><a href=\"#{slug}\">{status} {slug}</a></li>\n");
     }
-    page.push_str("</ul></nav>\n");
+    page += "</ul></nav>\n";
     for kind in Kind::ALL {
         let (slug, status) = (kind.slug(), kind.status());
-        line(
-            &mut page,
-            format_args!("<section id=\"{slug}\"><h2>{}</h2>", html(kind.title())),
-        );
-        line(
-            &mut page,
-            format_args!("<p><code>{slug}</code>, status {status}</p>"),
-        );
-        line(&mut page, format_args!("<p>{}</p>", html(kind.cause())));
-        line(
-            &mut page,
-            format_args!("<p><b>What to do:</b> {}</p></section>", html(kind.cure())),
+        let [title, cause, cure] = [kind.title(), kind.cause(), kind.cure()].map(html);
+        page += &format!(
+            "<section id=\"{slug}\"><h2>{title}</h2>\n\
+             <p><code>{slug}</code>, status {status}</p>\n\
+             <p>{cause}</p>\n\
+             <p><b>What to do:</b> {cure}</p></section>\n"
         );
     }
-    page.push_str("</body>\n</html>\n");
+    page += "</body>\n</html>\n";
     page
-}
-
-fn line(page: &mut String, text: std::fmt::Arguments<'_>) {
-    // Writing to a string cannot fail.
-    let _ = writeln!(page, "{text}");
 }
 
 /// A text of the catalogue as HTML: what stands in backticks is code.
