@@ -10,7 +10,6 @@ use axum::extract::Request;
 use axum::http::header::{HOST, ORIGIN};
 use axum::http::{HeaderMap, Version};
 use bagtrack_access::AllowedHosts;
-use bagtrack_config::Config;
 
 /// Refuses requests that do not name one host (RFC 9112, section 3.2): caches and proxies before the service might take
 /// another one of several.
@@ -27,10 +26,6 @@ pub fn one_host(request: &Request) -> Result<(), Problem> {
 /// Refuses what a browser sends for a page of another origin, or under the name of another host.
 pub fn check_origin(state: &AppState, request: &Request) -> Result<(), Problem> {
     let hosts = AllowedHosts::of(&state.config, state.access.is_needed());
-    check(&state.config, hosts, request)
-}
-
-fn check(config: &Config, hosts: AllowedHosts, request: &Request) -> Result<(), Problem> {
     let headers = request.headers();
     let named = request
         .uri()
@@ -50,7 +45,7 @@ fn check(config: &Config, hosts: AllowedHosts, request: &Request) -> Result<(), 
         Some(site) => matches!(site, "same-origin" | "none"),
         None => is_same_origin(origin, host),
     };
-    let mut allowed = config.cors_origins.iter();
+    let mut allowed = state.config.cors_origins.iter();
     match same || allowed.any(|allowed| allowed == "*" || allowed == origin) {
         true => Ok(()),
         false => Err(Problem::origin_not_allowed()),
