@@ -2,9 +2,8 @@
 
 use crate::common;
 use bagtrack_sessions::{
-    Admission, Boxes, Clock, CreationKey, Executor, FrameBatch, FramesError, Lease, OpenError,
-    OpenRequest, Opened, QuotaExhausted, Registry, Reservation, ServiceParts, Session,
-    SessionQuota, SessionService, Start, StoreShare, Tracked,
+    Admission, Boxes, Clock, Executor, FrameBatch, FramesError, Lease, Opened, Registry,
+    ServiceParts, Session, SessionService, Start, Tracked,
 };
 use bagtrack_testing::pictures::{encode, scene};
 use bagtrack_tracker::Rect;
@@ -13,7 +12,7 @@ use image::{GrayImage, ImageFormat, Luma};
 use std::sync::Arc;
 use std::time::Duration;
 
-pub use crate::common::{FIRST, FLOW, params, place};
+pub use crate::common::{FIRST, FLOW, FREE, Quota, params, place, request};
 
 /// Width and height of the pictures.
 pub const SIZE: (u32, u32) = (96, 72);
@@ -34,45 +33,6 @@ pub const LEASE: Lease = Lease {
 pub const WORK_TIMEOUT: Duration = Duration::from_secs(30);
 /// Most sessions of a service.
 pub const SESSIONS: usize = 3;
-
-/// A client's quota.
-#[derive(Debug)]
-pub struct Quota {
-    /// Whether it may open one more session.
-    pub is_free: bool,
-    /// How many targets its sessions may have together.
-    pub targets: usize,
-}
-
-/// The quota of a client that may have as much as it likes.
-pub const FREE: Quota = Quota {
-    is_free: true,
-    targets: usize::MAX,
-};
-
-impl SessionQuota for Quota {
-    fn check(&self) -> Result<(), OpenError> {
-        match self.is_free {
-            true => Ok(()),
-            false => Err(exhausted("sessions", 0)),
-        }
-    }
-
-    fn reserve(&self, targets: usize, _bytes: usize) -> Result<Reservation, OpenError> {
-        match targets <= self.targets {
-            true => Ok(Box::new(())),
-            false => Err(exhausted("targets", self.targets)),
-        }
-    }
-
-    fn store_share(&self) -> StoreShare {
-        unreachable!("there is no store")
-    }
-}
-
-fn exhausted(what: &'static str, limit: usize) -> OpenError {
-    QuotaExhausted { what, limit }.into()
-}
 
 pub fn png(picture: GrayImage) -> Bytes {
     encode(picture, ImageFormat::Png).into()
@@ -119,16 +79,6 @@ pub fn at_first(boxes: Boxes) -> Start {
         boxes,
         params: Box::new(params()),
     }
-}
-
-/// A request for a session, with the digest that is this byte again and again.
-pub fn request(
-    service: &SessionService,
-    key: Option<CreationKey>,
-    digest: u8,
-    start: Start,
-) -> OpenRequest {
-    common::request(service, Arc::new(FREE), (key, digest), start)
 }
 
 pub async fn open(service: &SessionService, boxes: Boxes) -> Arc<Session> {

@@ -1,9 +1,9 @@
 //! What the tests of acts and those of stores share: a service and its requests.
 
 use bagtrack_sessions::{
-    Admission, CreationKey, Flow, IdempotencyStore, MacKeys, OpenRequest, OpenStreams, Owner,
-    QueuePermit, Registry, ServiceParts, ServiceSettings, SessionQuota, SessionService, Start,
-    TrackingMetrics,
+    Admission, CreationKey, Flow, IdempotencyStore, MacKeys, OpenError, OpenRequest, OpenStreams,
+    Owner, QueuePermit, QuotaExhausted, Registry, Reservation, ServiceParts, ServiceSettings,
+    SessionQuota, SessionService, Start, StoreShare, TrackingMetrics,
 };
 use bagtrack_tracker::{Params, Preset, Rect};
 use metrics::Histogram;
@@ -68,11 +68,54 @@ pub fn place(service: &SessionService) -> QueuePermit {
     service.admission.enter(FLOW, Box::new(())).unwrap()
 }
 
+/// A client's quota.
+#[derive(Debug)]
+pub struct Quota {
+    /// Whether it may open one more session.
+    pub is_free: bool,
+    /// How many targets its sessions may have together.
+    pub targets: usize,
+}
+
+/// The quota of a client that may have as much as it likes.
+pub const FREE: Quota = Quota {
+    is_free: true,
+    targets: usize::MAX,
+};
+
+impl SessionQuota for Quota {
+    fn check(&self) -> Result<(), OpenError> {
+        match self.is_free {
+            true => Ok(()),
+            false => Err(exhausted("sessions", 0)),
+        }
+    }
+
+    fn reserve(&self, targets: usize, _bytes: usize) -> Result<Reservation, OpenError> {
+        match targets <= self.targets {
+            true => Ok(Box::new(())),
+            false => Err(exhausted("targets", self.targets)),
+        }
+    }
+
+    fn store_share(&self) -> StoreShare {
+        StoreShare {
+            client: "a client".to_owned(),
+            max_places: usize::MAX,
+            max_bytes: usize::MAX,
+        }
+    }
+}
+
+fn exhausted(what: &'static str, limit: usize) -> OpenError {
+    QuotaExhausted { what, limit }.into()
+}
+
 /// A request for a session, with the digest that is this byte again and again.
 pub fn request(
     service: &SessionService,
-    quota: Arc<dyn SessionQuota>,
-    (key, digest): (Option<CreationKey>, u8),
+    key: Option<CreationKey>,
+    digest: u8,
     start: Start,
 ) -> OpenRequest {
     OpenRequest {
@@ -80,7 +123,7 @@ pub fn request(
         owner: Owner::default(),
         digest: [digest; 32],
         start,
-        quota,
+        quota: Arc::new(FREE),
         queue: place(service),
     }
 }

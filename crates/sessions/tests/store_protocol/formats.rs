@@ -5,11 +5,11 @@
 //! its own: `BAGTRACK_FIXTURES=tests/fixtures/vX.Y.Z cargo test -p bagtrack-sessions --features redis --test
 //! store_protocol formats`.
 
-use crate::common::{FIRST, FLOW, keys, place};
+use crate::common::{FIRST, FLOW, keys, place, request};
 use crate::folder::copy;
 use crate::pictures::{params, picture};
 use crate::redis::Redis;
-use crate::world::{request, service};
+use crate::world::service;
 use bagtrack_sessions::{
     Boxes, Clock, CreationKey, Durability, Estimates, FileStore, FrameBatch, Owner, PerTarget,
     RedisAddress, RedisStore, SNAPSHOT_MAGIC, SessionService, SessionStore, Start, Version,

@@ -1,10 +1,10 @@
 //! Requests with an idempotency key, at replicas with one store.
 
-use crate::common::{FIRST, FLOW};
+use crate::common::{FIRST, FLOW, request};
 use crate::hostile::HostileStore;
 use crate::pictures::{params, picture};
 use crate::redis::Redis;
-use crate::world::{LONG, request, service};
+use crate::world::{LONG, service};
 use bagtrack_sessions::{
     Boxes, Clock, CreationKey, Durability, FileStore, OpenError, OpenRequest, Opened, Owner,
     SessionService, SessionStore, Start,

@@ -1,12 +1,12 @@
 //! Two replicas with one store, a client, and its rival that sends other frames under the same numbers.
 
-use crate::common::{self, FIRST, FLOW, place};
+use crate::common::{self, FIRST, FLOW, place, request};
 use crate::hostile::HostileStore;
 use crate::pictures::{params, picture};
 use bagtrack_sessions::{
     ActError, Admission, Boxes, Clock, CreationKey, Estimates, FrameBatch, FramesError, Lease,
-    OpenError, OpenRequest, Owner, Registry, ReplayError, Reservation, ServiceParts, Session,
-    SessionQuota, SessionService, SessionStore, Start, StoreShare, StreamPlace,
+    Owner, Registry, ReplayError, ServiceParts, Session, SessionService, SessionStore, Start,
+    StreamPlace,
 };
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -54,27 +54,6 @@ pub enum Answer {
     Nothing(String),
 }
 
-#[derive(Debug)]
-pub struct NoQuota;
-
-impl SessionQuota for NoQuota {
-    fn check(&self) -> Result<(), OpenError> {
-        Ok(())
-    }
-
-    fn store_share(&self) -> StoreShare {
-        StoreShare {
-            client: "a client".to_owned(),
-            max_places: usize::MAX,
-            max_bytes: usize::MAX,
-        }
-    }
-
-    fn reserve(&self, _targets: usize, _bytes: usize) -> Result<Reservation, OpenError> {
-        Ok(Box::new(()))
-    }
-}
-
 pub struct Replica {
     pub service: SessionService,
     pub job: Option<JoinHandle<()>>,
@@ -117,16 +96,6 @@ pub fn start(seed: u64) -> Start {
         boxes: Boxes::One(FIRST),
         params: Box::new(params(seed)),
     }
-}
-
-/// A request for a session, with the digest that is this byte again and again.
-pub fn request(
-    service: &SessionService,
-    key: Option<CreationKey>,
-    digest: u8,
-    start: Start,
-) -> OpenRequest {
-    common::request(service, Arc::new(NoQuota), (key, digest), start)
 }
 
 impl Replica {
