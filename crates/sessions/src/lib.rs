@@ -12,7 +12,7 @@
 //! - Requests wait for the map. Its lock is held for a look-up only, never during work, and nothing is freed under it.
 //! - Two requests step one tracker at once. A session has a lock of its own, taken in order of arrival.
 //! - Work outlives the request that asked for it. It keeps its permits until it has really ended.
-//! - A client loses the answer to a frame. It sends the frame again with its number: see [`ReplayDecision`].
+//! - A client loses the answer to a frame. It sends the frame again with its number: see [`ReplayError`].
 //! - A client never ends its session. It expires when no frame came for a while, by a [`Clock`] that tests can move
 //!   forward; sooner where none came at all.
 //! - A snapshot comes back damaged or forged. It carries a code under a key of the service ([`MacKeys`]), and all in it
@@ -59,7 +59,7 @@ pub use per_target::{MAX_TARGETS, PerTarget};
 #[cfg(feature = "planted-faults")]
 pub use planted::{PlantedFault, plant};
 pub use registry::{NoSession, Registry, TooManySessions};
-pub use replay::{Fingerprint, ReplayDecision, ReplayError};
+pub use replay::{Fingerprint, ReplayError};
 pub use scheduler::admission::{Admission, NoOutcome, QueueFull, WorkPanicked};
 pub use scheduler::budget::{Budget, BudgetFull, Charge};
 pub use scheduler::charged_bytes::ChargedBytes;

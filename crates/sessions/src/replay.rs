@@ -58,15 +58,6 @@ impl Answered {
     }
 }
 
-/// What to do with a request.
-#[derive(Debug, Clone, PartialEq)]
-pub enum ReplayDecision {
-    /// It holds the next frame: process it.
-    Process,
-    /// It was answered before: these are the answers.
-    Replay(Vec<Estimates>),
-}
-
 /// The frame number does not fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ReplayError {
@@ -90,26 +81,28 @@ pub enum ReplayError {
     },
 }
 
-/// Decides about a request with the frames `posted`, which the client numbers from `number` on. `recent` are the
-/// answers to the last frames, at least one. `given` is the box, where the request corrects it.
+/// The answers to a request with the frames `posted`, which the client numbers from `number` on, where they were given
+/// before; none where it holds the next frame. `recent` are the answers to the last frames, at least one. `given` is the
+/// box, where the request corrects it.
 ///
-/// A request is a replay if the answers to all its frames are stored, and their bytes (and the box) are the same.
+/// A request is a replay if the answers to all its frames are stored, and their bytes (and the box) are the same. One
+/// without a number never is.
 ///
 /// # Errors
 /// See [`ReplayError`].
-pub(super) fn decide(
+pub(super) fn replayed(
     recent: &[Answered],
     number: Option<u64>,
     posted: &[Fingerprint],
     given: Option<Correction>,
-) -> Result<ReplayDecision, ReplayError> {
+) -> Result<Option<Vec<Estimates>>, ReplayError> {
     let last = recent
         .last()
         .expect("a session has answered its first frame");
     let expected = last.frame() + 1;
     let got = match number {
-        None => return Ok(ReplayDecision::Process),
-        Some(number) if number == expected => return Ok(ReplayDecision::Process),
+        None => return Ok(None),
+        Some(number) if number == expected => return Ok(None),
         Some(number) => number,
     };
     let first = recent.iter().position(|stored| stored.frame() == got);
@@ -118,11 +111,9 @@ pub(super) fn decide(
     let mut pairs = stored.iter().zip(posted);
     if pairs.all(|(stored, posted)| stored.is_of(*posted, given)) {
         if PlantedFault::TracksTwice.is_here() {
-            return Ok(ReplayDecision::Process);
+            return Ok(None);
         }
-        Ok(ReplayDecision::Replay(
-            stored.iter().map(Answered::estimates).collect(),
-        ))
+        Ok(Some(stored.iter().map(Answered::estimates).collect()))
     } else {
         Err(ReplayError::Differs { got, expected })
     }

@@ -1,6 +1,6 @@
 //! What work on a session changes: the trackers, and the answers that a repeated request gets again.
 
-use super::replay::{self, Answered, Fingerprint, ReplayDecision, ReplayError, TargetAnswer};
+use super::replay::{self, Answered, Fingerprint, ReplayError, TargetAnswer};
 use super::scheduler::work_limit::{Stopped, WorkMeter};
 use super::targets::{Boxes, Correction, Estimates, StartError, Targets, TargetsError};
 use bagtrack_tracker::{BagEntry, Diagnostics, Expert, Frame, FrameFormat, Params};
@@ -82,22 +82,6 @@ impl SessionState {
     /// Bytes that the session keeps at most.
     pub fn session_bytes(&self) -> usize {
         self.targets.session_bytes()
-    }
-
-    /// Whether a request is to be processed or was answered before. `number` is what the client calls its (first)
-    /// frame; `given` is the box, where it corrects one. Without a number every request is processed. With one, a
-    /// request is a replay if the answers to all its frames are stored, and were given for the same bytes and the same
-    /// box.
-    ///
-    /// # Errors
-    /// The frame number does not fit.
-    pub fn replay_decision(
-        &self,
-        number: Option<u64>,
-        posted: &[Fingerprint],
-        given: Option<Correction>,
-    ) -> Result<ReplayDecision, ReplayError> {
-        replay::decide(&self.recent, number, posted, given)
     }
 
     /// The stored answers from frame `number` on, oldest first; none where one of them is not stored any more. All have

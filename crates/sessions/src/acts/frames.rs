@@ -4,10 +4,10 @@
 use super::box_check;
 use super::error::{FrameFault, FramesError};
 use super::tracking_metrics::TrackingMetrics;
-use crate::replay::Answered;
+use crate::replay::{Answered, replayed};
 use crate::streams::StreamPlace;
 use crate::targets::TargetsError;
-use crate::{Correction, Estimates, Fingerprint, ReplayDecision, SessionState, WorkMeter};
+use crate::{Correction, Estimates, Fingerprint, SessionState, WorkMeter};
 use bagtrack_ingest::{Inspected, Limits};
 use bagtrack_tracker::{Diagnostics, Rect, TrackerError};
 use bytes::Bytes;
@@ -116,8 +116,8 @@ impl FrameBatch {
             .correction
             .map(|given| given.of(state.target_count(), state.source_size()));
         let correction = correction.transpose()?;
-        let decision = state.replay_decision(self.number, &fingerprints, correction)?;
-        if let ReplayDecision::Replay(estimates) = decision {
+        let replayed = replayed(&state.recent, self.number, &fingerprints, correction)?;
+        if let Some(estimates) = replayed {
             return Ok(Tracked {
                 estimates,
                 replayed: true,
