@@ -6,18 +6,11 @@ use crate::replica::Replica;
 use crate::tracking_client::{Answer, Track};
 use bagtrack_testing::command::program;
 use reqwest::{Client, Response, StatusCode};
-use serde_json::Value;
 use std::ops::Range;
 use std::path::Path;
 use uuid::Uuid;
 
-/// The body of an answer that has this status.
-pub async fn json(response: Response, status: StatusCode) -> Value {
-    let got = response.status();
-    let text = response.text().await.unwrap();
-    assert_eq!(got, status, "{text}");
-    serde_json::from_str(&text).unwrap_or_default()
-}
+pub use bagtrack_testing::service::application::expect as json;
 
 pub struct Pair {
     pub redis: Redis,
