@@ -18,15 +18,7 @@ use bagtrack_tracker::{Params, Preset, Tracker};
 /// A tracker of the scene with a full history and a full bag, and its frames.
 fn warm(params: Params) -> (Tracker, Vec<bagtrack_tracker::Frame>) {
     let frames = scene::frames();
-    let until = (params.bag_size * params.update_every) as usize + 1;
-    let mut tracker =
-        Tracker::new(&frames[0], scene::target(0), params).expect("a box inside the frame");
-    for t in 1..=until.next_multiple_of(scene::ROUND) {
-        tracker
-            .step(&frames[t % scene::ROUND])
-            .expect("frames of one size");
-    }
-    (tracker, frames)
+    (scene::warm(&frames, params), frames)
 }
 
 fn main() {

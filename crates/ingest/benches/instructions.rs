@@ -7,7 +7,7 @@
 
 use bagtrack_ingest::{Limits, decode, recycle};
 use bagtrack_testing::{bench_pictures as pictures, bench_scene as scene};
-use bagtrack_tracker::{Params, Preset, Tracker};
+use bagtrack_tracker::{Preset, Tracker};
 use std::hint::black_box;
 
 const MOST_STEPS: usize = 16;
@@ -38,21 +38,8 @@ fn number(argument: &str) -> usize {
     })
 }
 
-/// Steps that fill the bag of either preset, in whole rounds of the scene.
-fn steps_before(params: &Params) -> usize {
-    ((params.bag_size * params.update_every) as usize + 1).next_multiple_of(scene::ROUND)
-}
-
 fn fill(preset: Preset, file: &str) {
-    let params = preset.params();
-    let frames = scene::frames();
-    let mut tracker =
-        Tracker::new(&frames[0], scene::target(0), params.clone()).expect("a box inside the frame");
-    for t in 1..=steps_before(&params) {
-        tracker
-            .step(&frames[t % scene::ROUND])
-            .expect("frames of one size");
-    }
+    let tracker = scene::warm(&scene::frames(), preset.params());
     std::fs::write(file, tracker.snapshot()).expect("a file that can be written");
 }
 

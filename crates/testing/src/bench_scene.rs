@@ -1,6 +1,6 @@
 //! The scene of the benchmarks: a textured target that moves on a circle over a texture.
 
-use bagtrack_tracker::{Frame, Rect};
+use bagtrack_tracker::{Frame, Params, Rect, Tracker};
 
 pub const WIDTH: usize = 320;
 pub const HEIGHT: usize = 240;
@@ -55,6 +55,18 @@ pub fn frame(t: usize) -> Frame {
 
 pub fn frames() -> Vec<Frame> {
     (0..ROUND).map(frame).collect()
+}
+
+/// A tracker of the target that has seen whole rounds of these frames, until its history and its bag are full.
+pub fn warm(frames: &[Frame], params: Params) -> Tracker {
+    let until = (params.bag_size * params.update_every) as usize + 1;
+    let mut tracker = Tracker::new(&frames[0], target(0), params).expect("a box inside the frame");
+    for t in 1..=until.next_multiple_of(ROUND) {
+        tracker
+            .step(&frames[t % ROUND])
+            .expect("frames of one size");
+    }
+    tracker
 }
 
 /// The box of the target in frame `t`.
