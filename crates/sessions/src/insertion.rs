@@ -7,6 +7,7 @@ use super::scheduler::budget::Charge;
 use super::scheduler::queue_permit::Reservation;
 use super::session::{NewSession, Session};
 use super::state::SessionState;
+use super::sync::lock;
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
 use std::time::Duration;
@@ -63,7 +64,7 @@ impl Registry {
         new.held = held;
         let session = Session::new(new, self.max_requests, self.lease, self.clock.clone());
         let before = {
-            let mut sessions = self.map();
+            let mut sessions = lock(&self.sessions);
             match sessions.get(&session.id()) {
                 Some(live) if !self.has_ended(live) => return Err(InsertError::Taken),
                 None if sessions.len() >= self.max_sessions => return Err(full.into()),
@@ -90,7 +91,7 @@ impl Registry {
     fn evict(&self) {
         let idle = |session: &&Arc<Session>| !session.is_busy() && session.version().is_some();
         let mut oldest: Vec<(Duration, Uuid)> = {
-            let sessions = self.map();
+            let sessions = lock(&self.sessions);
             let idle = sessions.values().filter(idle);
             idle.map(|session| (session.expires(), session.id()))
                 .collect()
@@ -99,7 +100,7 @@ impl Registry {
         oldest.sort_unstable();
         for (_, id) in oldest.into_iter().take(count) {
             // It may be in use by now, or another session may have its id. What is freed is freed after the lock.
-            let _evicted = match self.map().entry(id) {
+            let _evicted = match lock(&self.sessions).entry(id) {
                 Entry::Occupied(entry) if idle(&entry.get()) => Some(entry.remove()),
                 _ => None,
             };

@@ -6,7 +6,7 @@ use super::opening::Owner;
 use super::scheduler::budget::Budget;
 use super::session::{Lease, Session};
 use super::store::SessionName;
-use super::sync::{Mutex, MutexGuard, PoisonError};
+use super::sync::{Mutex, lock};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
@@ -35,7 +35,7 @@ pub enum NoSession {
 /// The live sessions.
 #[derive(Debug)]
 pub struct Registry {
-    sessions: Mutex<HashMap<Uuid, Arc<Session>>>,
+    pub(super) sessions: Mutex<HashMap<Uuid, Arc<Session>>>,
     pub(super) max_sessions: usize,
     /// Whether sessions go where there is no room: a store has them.
     pub(super) evicts: bool,
@@ -96,7 +96,7 @@ impl Registry {
 
     /// The live session of this id, whoever it belongs to.
     pub fn live(&self, id: Uuid) -> Option<Arc<Session>> {
-        let session = self.map().get(&id).cloned();
+        let session = lock(&self.sessions).get(&id).cloned();
         session.filter(|session| !self.has_ended(session))
     }
 
@@ -106,7 +106,7 @@ impl Registry {
     /// See [`NoSession`]. Of another owner's session nothing is told.
     pub fn find(&self, id: Uuid, owner: &Owner) -> Result<Arc<Session>, NoSession> {
         let ended = {
-            let mut sessions = self.map();
+            let mut sessions = lock(&self.sessions);
             match sessions.get(&id) {
                 Some(session) if session.owner() != owner => return Err(NoSession::Unknown),
                 Some(session) if !self.has_ended(session) => return Ok(session.clone()),
@@ -117,7 +117,7 @@ impl Registry {
         if let Some(ended) = ended {
             self.end(&ended);
         }
-        match self.expired().contains(id, owner, self.clock.now()) {
+        match lock(&self.expired).contains(id, owner, self.clock.now()) {
             true => Err(NoSession::Expired),
             false => Err(NoSession::Unknown),
         }
@@ -131,7 +131,7 @@ impl Registry {
     /// Ends a session. Work that has begun on it still gets its answer; requests that wait for it do not. False if
     /// there is no such session: another one that has its id by now stays.
     pub fn remove(&self, name: SessionName) -> bool {
-        let removed = match self.map().entry(name.id) {
+        let removed = match lock(&self.sessions).entry(name.id) {
             Entry::Occupied(entry) if entry.get().name() == name => Some(entry.remove()),
             _ => None,
         };
@@ -144,7 +144,7 @@ impl Registry {
     /// Removes this session from memory, unless another one has its id by now. It may live on in the store.
     pub fn forget(&self, session: &Arc<Session>) {
         // What is freed is freed after the lock.
-        let _forgotten = match self.map().entry(session.id()) {
+        let _forgotten = match lock(&self.sessions).entry(session.id()) {
             Entry::Occupied(entry) if Arc::ptr_eq(entry.get(), session) => Some(entry.remove()),
             _ => None,
         };
@@ -153,7 +153,7 @@ impl Registry {
     /// Removes the sessions that have expired. Returns their number.
     pub fn sweep(&self) -> usize {
         let ended: Vec<Arc<Session>> = {
-            let mut sessions = self.map();
+            let mut sessions = lock(&self.sessions);
             let ended = sessions.extract_if(|_, session| self.has_ended(session));
             ended.map(|(_, session)| session).collect()
         };
@@ -163,12 +163,12 @@ impl Registry {
 
     /// All sessions in the map.
     pub fn all(&self) -> Vec<Arc<Session>> {
-        self.map().values().cloned().collect()
+        lock(&self.sessions).values().cloned().collect()
     }
 
     /// Number of sessions in the map, those included that have expired since the last sweep.
     pub fn len(&self) -> usize {
-        self.map().len()
+        lock(&self.sessions).len()
     }
 
     /// Whether there are no sessions.
@@ -191,19 +191,9 @@ impl Registry {
     fn end(&self, session: &Session) {
         if !session.is_closed() {
             let (owner, now) = (session.owner().clone(), self.clock.now());
-            self.expired().note(session.id(), owner, now);
+            lock(&self.expired).note(session.id(), owner, now);
         }
         session.close();
-    }
-
-    fn expired(&self) -> MutexGuard<'_, ExpiredIds> {
-        // Nothing panics while it is held.
-        self.expired.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    pub(super) fn map(&self) -> MutexGuard<'_, HashMap<Uuid, Arc<Session>>> {
-        // Nothing panics while it is held; were it so, the map itself would still be whole.
-        self.sessions.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -6,7 +6,7 @@ use super::scheduler::queue_permit::Reservation;
 use super::state::SessionState;
 use super::store::{SessionName, Version};
 use super::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use super::sync::{Mutex, PoisonError};
+use super::sync::{Mutex, lock};
 use super::targets::Estimates;
 use bagtrack_tracker::Params;
 use std::sync::Arc;
@@ -182,12 +182,12 @@ impl Session {
 
     /// Which version of the record in the store the state goes on from; none where there is no record.
     pub fn version(&self) -> Option<Version> {
-        *self.version.lock().unwrap_or_else(PoisonError::into_inner)
+        *lock(&self.version)
     }
 
     /// The state is that of the record in the store, or goes on from it.
     pub(super) fn set_version(&self, version: Option<Version>) {
-        *self.version.lock().unwrap_or_else(PoisonError::into_inner) = version;
+        *lock(&self.version) = version;
     }
 
     /// The last frame whose state is in the store, where there is one.

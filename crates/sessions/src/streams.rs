@@ -3,7 +3,7 @@
 
 use crate::Session;
 use crate::sync::atomic::{AtomicBool, Ordering};
-use crate::sync::{Mutex, MutexGuard, PoisonError};
+use crate::sync::{Mutex, lock};
 use std::collections::HashMap;
 use std::sync::Arc;
 use tokio::sync::Notify;
@@ -34,7 +34,7 @@ impl OpenStreams {
     /// Takes the place at this session. The stream that has it is told, and tracks no further frame.
     pub fn take(&self, session: Uuid) -> StreamPlace {
         let replacement = Arc::new(Replacement::default());
-        let before = self.lock().insert(session, replacement.clone());
+        let before = lock(&self.0).insert(session, replacement.clone());
         if let Some(before) = before {
             before.done.store(true, Ordering::Release);
             before.told.notify_one();
@@ -46,28 +46,17 @@ impl OpenStreams {
             generation: Mutex::default(),
         }
     }
-
-    fn lock(&self) -> MutexGuard<'_, HashMap<Uuid, Arc<Replacement>>> {
-        // Nothing panics while it is held.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 impl StreamPlace {
     /// The stream begins at the session as it stands, or goes on with it after the store has lost its record.
     pub fn begin(&self, session: &Session) {
-        *self.generation() = session.version().map(|version| version.generation);
-    }
-
-    fn generation(&self) -> MutexGuard<'_, Option<u64>> {
-        // Nothing panics while it is held.
-        let own = self.generation.lock();
-        own.unwrap_or_else(PoisonError::into_inner)
+        *lock(&self.generation) = session.version().map(|version| version.generation);
     }
 
     /// Whether the stream has ended, since another one has the place now, here or at another replica.
     pub fn has_ended(&self, session: &Session) -> bool {
-        let own = *self.generation();
+        let own = *lock(&self.generation);
         let now = session.version().map(|version| version.generation);
         if own.is_some() && own != now {
             self.replacement.done.store(true, Ordering::Release);
@@ -88,7 +77,7 @@ impl StreamPlace {
 
 impl Drop for StreamPlace {
     fn drop(&mut self) {
-        let mut open = self.streams.lock();
+        let mut open = lock(&self.streams.0);
         let own = open.get(&self.session);
         if own.is_some_and(|own| Arc::ptr_eq(own, &self.replacement)) {
             open.remove(&self.session);
@@ -109,8 +98,8 @@ mod tests {
         let other = streams.take(Uuid::from_u128(2));
         assert!(old.is_replaced() && !new.is_replaced() && !other.is_replaced());
         drop(old);
-        assert_eq!(streams.lock().len(), 2, "the new one keeps its place");
+        assert_eq!(lock(&streams.0).len(), 2, "the new one keeps its place");
         drop((new, other));
-        assert!(streams.lock().is_empty());
+        assert!(lock(&streams.0).is_empty());
     }
 }

@@ -13,6 +13,11 @@ pub(crate) use std::{
     thread,
 };
 
+/// Takes a lock. Nothing panics while one is held, so what it guards is whole.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Blocks this thread until something was sent.
 ///
 /// # Errors

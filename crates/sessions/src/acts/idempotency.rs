@@ -7,7 +7,7 @@
 //! be sent again after them.
 
 use crate::Owner;
-use crate::sync::{Mutex, MutexGuard, PoisonError};
+use crate::sync::{Mutex, lock};
 use std::collections::HashMap;
 use std::sync::Arc;
 use tokio::sync::Mutex as AsyncMutex;
@@ -54,25 +54,20 @@ impl IdempotencyStore {
 
     /// The entry of a name: the one that is there, or a new one.
     pub fn entry(&self, name: CreationKey, is_live: impl Fn(Uuid) -> bool) -> Entry {
-        if self.map().len() >= self.max_entries {
+        if lock(&self.entries).len() >= self.max_entries {
             self.prune(is_live);
         }
-        self.map().entry(name).or_default().clone()
+        lock(&self.entries).entry(name).or_default().clone()
     }
 
     /// Drops the entries whose sessions have ended.
     pub fn prune(&self, is_live: impl Fn(Uuid) -> bool) {
-        self.map().retain(|_, entry| {
+        lock(&self.entries).retain(|_, entry| {
             // A request that holds the entry or waits for it holds a clone.
             let in_use = Arc::strong_count(entry) > 1;
             let stored = entry.try_lock();
             in_use || stored.is_ok_and(|stored| stored.is_some_and(&is_live))
         });
-    }
-
-    fn map(&self) -> MutexGuard<'_, HashMap<CreationKey, Entry>> {
-        // Nothing panics while it is held.
-        self.entries.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -105,15 +100,15 @@ mod tests {
         }
         drop(store.entry(name("refused"), live));
         let used = store.entry(name("used"), live);
-        assert_eq!(store.map().len(), 4);
+        assert_eq!(lock(&store.entries).len(), 4);
         drop(store.entry(name("one more"), live));
-        let left = store.map().len();
+        let left = lock(&store.entries).len();
         assert_eq!(
             left, 3,
             "the live session's, the one in use, and the new one"
         );
         drop(used);
         store.prune(|_| false);
-        assert_eq!(store.map().len(), 0);
+        assert_eq!(lock(&store.entries).len(), 0);
     }
 }

@@ -12,7 +12,7 @@ use super::places::Places;
 use super::queue_permit::{QueuePermit, Reservation, Ticket};
 use super::workers::AfterWork;
 use crate::planted::PlantedFault;
-use crate::sync::{Mutex, PoisonError};
+use crate::sync::{Mutex, lock};
 use std::any::Any;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -54,17 +54,9 @@ struct Unstarted<W>(Arc<Mutex<Option<W>>>);
 
 impl<W> Drop for Unstarted<W> {
     fn drop(&mut self) {
-        drop(take(&self.0));
+        // It is dropped after the lock.
+        let _work = lock(&self.0).take();
     }
-}
-
-/// Takes the work that waits, if nobody did before.
-fn take<W>(waiting: &Mutex<Option<W>>) -> Option<W> {
-    // Nothing panics while it is held.
-    waiting
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner)
-        .take()
 }
 
 /// A queue before the workers. Clones share both.
@@ -146,7 +138,7 @@ impl Admission {
         let unstarted = Unstarted(Arc::new(Mutex::new(Some((queue, work)))));
         let (taken, executor) = (unstarted.0.clone(), self.executor.clone());
         let start = move |mut turn: WorkerSlot| {
-            let Some((queue, work)) = take(&taken) else {
+            let Some((queue, work)) = lock(&taken).take() else {
                 return Err(turn);
             };
             let class = turn.class();

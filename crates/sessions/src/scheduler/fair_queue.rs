@@ -16,7 +16,7 @@ use super::cpu_time::CpuClock;
 use super::executor::Executor;
 use super::flows::{Flow, Flows, Held, Job, Next, Request, SizeClass};
 use super::workers::AfterWork;
-use crate::sync::{self, Mutex, MutexGuard, PoisonError};
+use crate::sync::{self, Mutex, lock};
 use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
@@ -28,7 +28,7 @@ type Give = Box<dyn FnOnce(WorkerSlot) -> Result<(), WorkerSlot> + Send>;
 /// The queue. Clones are the same one.
 #[derive(Clone)]
 pub(super) struct FairQueue {
-    flows: Arc<Mutex<Flows<Give>>>,
+    pub(super) flows: Arc<Mutex<Flows<Give>>>,
     cpu: CpuClock,
     /// What runs the work; none where a test does.
     executor: Option<Executor>,
@@ -91,7 +91,7 @@ impl FairQueue {
             may_refuse,
         } = asked;
         let worker = {
-            let mut state = self.lock();
+            let mut state = lock(&self.flows);
             state.forget_idle_flows();
             state.enter(flow, expected);
             let since = may_refuse.then(|| state.time());
@@ -123,7 +123,7 @@ impl FairQueue {
     }
 
     pub(super) fn running(&self) -> usize {
-        self.lock().running()
+        lock(&self.flows).running()
     }
 
     /// Gives the worker of `flow` to a flow with a better claim, if there is one. Returns what gets a worker again.
@@ -134,7 +134,7 @@ impl FairQueue {
         held: Held,
     ) -> Option<oneshot::Receiver<WorkerSlot>> {
         let given = {
-            let mut state = self.lock();
+            let mut state = lock(&self.flows);
             if !state.has_better(flow, class, held.time) {
                 return None;
             }
@@ -154,7 +154,7 @@ impl FairQueue {
     /// Another worker for `flow`, where one is idle.
     fn borrow_idle(&self, flow: Flow) -> Option<WorkerSlot> {
         let class = {
-            let mut state = self.lock();
+            let mut state = lock(&self.flows);
             let class = state.worker_for(state.flows.get(&flow)?, Job::Single)?;
             state.serve(flow, Job::Single, class);
             class
@@ -180,7 +180,7 @@ impl FairQueue {
         let mut ended = Some((flow, class, held));
         loop {
             let (flow, length, class, give) = {
-                let mut state = self.lock();
+                let mut state = lock(&self.flows);
                 if let Some((flow, class, held)) = ended.take() {
                     state.release(flow, class, held);
                 }
@@ -206,11 +206,6 @@ impl FairQueue {
                 ended = Some((flow, class, held));
             }
         }
-    }
-
-    pub(super) fn lock(&self) -> MutexGuard<'_, Flows<Give>> {
-        // Nothing panics while it is held.
-        self.flows.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -282,7 +277,7 @@ impl WorkerSlot {
     fn is_wanted(&mut self) -> bool {
         let time = self.held(false).time;
         self.queue.as_ref().is_some_and(|queue| {
-            let mut state = queue.lock();
+            let mut state = lock(&queue.flows);
             state.is_crowded() || state.has_better(self.flow, self.class, time)
         })
     }
@@ -363,7 +358,7 @@ mod tests {
         drop((short, done));
         frames.join().unwrap();
         assert_eq!(order.iter().collect::<Vec<_>>(), ["short", "long"]);
-        assert_eq!((queue.running(), queue.lock().begun), (0, 0));
+        assert_eq!((queue.running(), lock(&queue.flows).begun), (0, 0));
     }
 
     #[test]
@@ -375,7 +370,7 @@ mod tests {
         short.yield_to_others();
         drop(short);
         drop(given(&mut other));
-        assert_eq!((queue.running(), queue.lock().begun), (0, 0));
+        assert_eq!((queue.running(), lock(&queue.flows).begun), (0, 0));
     }
 
     #[test]

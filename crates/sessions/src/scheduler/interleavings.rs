@@ -12,6 +12,7 @@ use super::workers::Workers;
 use crate::clock;
 use crate::interleavings::explore;
 use crate::sync::atomic::{AtomicUsize, Ordering};
+use crate::sync::lock;
 use crate::sync::thread::{self, JoinHandle};
 use futures_util::future::{Either, select};
 use shuttle::future::block_on;
@@ -71,7 +72,7 @@ fn assert_idle(admission: &Admission, places: usize) {
     }
     let inside = admission.requests_inside();
     assert_eq!((admission.queue_places(), inside), (places, 0));
-    let flows = admission.workers.lock();
+    let flows = lock(&admission.workers.flows);
     assert_eq!((flows.running(), flows.begun), (0, 0));
     let waiting = flows.flows.values().map(|flow| flow.requests.len());
     assert_eq!(waiting.sum::<usize>(), 0);
@@ -222,7 +223,7 @@ fn what_is_refused_for_its_wait_is_told_so_and_all_else_runs_once() {
         let queue = admission.workers.clone();
         threads.push(thread::spawn(move || {
             for _ in 0..12 {
-                queue.lock().passed += Duration::from_millis(200);
+                lock(&queue.flows).passed += Duration::from_millis(200);
             }
         }));
         join(threads);

@@ -4,7 +4,7 @@
 //! So some clients with all the requests that they may have in flight do not close the service to the others.
 
 use super::flows::Flow;
-use crate::sync::{Mutex, MutexGuard, PoisonError};
+use crate::sync::{Mutex, lock};
 use std::collections::HashMap;
 use std::sync::Arc;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
@@ -38,7 +38,7 @@ impl Places {
 
     /// Takes a place, where there is one for this client.
     pub(super) fn take(self: &Arc<Self>, flow: Flow) -> Option<Place> {
-        let mut taken = self.taken();
+        let mut taken = lock(&self.taken);
         let permit = self.queue.clone().try_acquire_owned().ok();
         let permit = match taken.contains_key(&flow) {
             true => permit?,
@@ -54,12 +54,12 @@ impl Places {
         }
         let permit = self.queue.clone().acquire_owned().await;
         let permit = permit.expect("the queue is never closed");
-        self.place(&mut self.taken(), flow, permit)
+        self.place(&mut lock(&self.taken), flow, permit)
     }
 
     /// Whether there is a place for this client now.
     pub(super) fn has_place(&self, flow: Flow) -> bool {
-        let is_new = !self.taken().contains_key(&flow);
+        let is_new = !lock(&self.taken).contains_key(&flow);
         self.free() > 0 || is_new && self.spare.available_permits() > 0
     }
 
@@ -69,7 +69,7 @@ impl Places {
     }
 
     pub(super) fn len(&self) -> usize {
-        self.taken().values().sum()
+        lock(&self.taken).values().sum()
     }
 
     fn place(
@@ -85,16 +85,11 @@ impl Places {
             _permit: permit,
         }
     }
-
-    fn taken(&self) -> MutexGuard<'_, HashMap<Flow, usize>> {
-        // Nothing panics while it is held.
-        self.taken.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 impl Drop for Place {
     fn drop(&mut self) {
-        let mut taken = self.places.taken();
+        let mut taken = lock(&self.places.taken);
         if let Some(count) = taken.get_mut(&self.flow) {
             *count -= 1;
             if *count == 0 {
@@ -124,6 +119,6 @@ mod tests {
         assert!(places.take(Flow(13)).is_none() && !places.has_place(Flow(13)));
         drop((other, held));
         assert_eq!((places.free(), places.len()), (4, 0));
-        assert!(places.taken().is_empty(), "clients are forgotten");
+        assert!(lock(&places.taken).is_empty(), "clients are forgotten");
     }
 }

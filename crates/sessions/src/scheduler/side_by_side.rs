@@ -4,7 +4,7 @@
 //! one that it is at.
 
 use super::cpu_time::CpuClock;
-use crate::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use crate::sync::{Condvar, Mutex, PoisonError, lock};
 use std::any::Any;
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -50,7 +50,7 @@ impl<T, R, F: Fn(&mut T) -> R> Parts<T, R, F> {
     /// Works on the next part, and tells its processor time; none where no part is left.
     pub(super) fn work(&self) -> Option<Duration> {
         let (number, mut part) = {
-            let mut state = self.lock();
+            let mut state = lock(&self.state);
             let next = state.waiting.pop_front()?;
             state.begun += 1;
             next
@@ -58,7 +58,7 @@ impl<T, R, F: Fn(&mut T) -> R> Parts<T, R, F> {
         let before = self.cpu.now();
         let outcome = catch_unwind(AssertUnwindSafe(|| (self.step)(&mut part)));
         let time = self.cpu.now().saturating_sub(before);
-        let mut state = self.lock();
+        let mut state = lock(&self.state);
         state.begun -= 1;
         match outcome {
             Ok(result) => state.done.push((number, (part, Some((result, time))))),
@@ -76,7 +76,7 @@ impl<T, R, F: Fn(&mut T) -> R> Parts<T, R, F> {
     /// # Panics
     /// As a step did.
     pub(super) fn end(&self) -> Vec<Outcome<T, R>> {
-        let mut state = self.lock();
+        let mut state = lock(&self.state);
         let left = std::mem::take(&mut state.waiting);
         while state.begun > 0 {
             state = self
@@ -95,10 +95,5 @@ impl<T, R, F: Fn(&mut T) -> R> Parts<T, R, F> {
         );
         all.sort_unstable_by_key(|(number, _)| *number);
         all.into_iter().map(|(_, outcome)| outcome).collect()
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State<T, R>> {
-        // Nothing panics while it is held.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -3,7 +3,7 @@
 //! A thread keeps a megabyte or more of buffers from one frame to the next. So work goes to the thread that became idle
 //! last: its buffers are most likely still in the caches of its core.
 
-use crate::sync::{Condvar, Mutex, MutexGuard, PoisonError, thread};
+use crate::sync::{Condvar, Mutex, PoisonError, lock, thread};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::{fmt, io};
@@ -17,7 +17,9 @@ pub type AfterWork = Box<dyn FnOnce()>;
 pub(super) struct Workers(Arc<Shared>);
 
 #[derive(Default)]
-struct Shared(Mutex<State>);
+struct Shared {
+    state: Mutex<State>,
+}
 
 #[derive(Default)]
 struct State {
@@ -45,7 +47,7 @@ impl Workers {
 
     /// Runs `job` on a thread: at once if one is idle, else after the jobs that wait already.
     pub(super) fn start(&self, job: Work) {
-        let mut state = self.0.lock();
+        let mut state = lock(&self.0.state);
         match state.idle.pop() {
             Some(slot) => {
                 drop(state);
@@ -58,7 +60,7 @@ impl Workers {
 
 impl Drop for Workers {
     fn drop(&mut self) {
-        let mut state = self.0.lock();
+        let mut state = lock(&self.0.state);
         state.closed = true;
         let idle = std::mem::take(&mut state.idle);
         drop(state);
@@ -68,7 +70,8 @@ impl Drop for Workers {
 
 impl fmt::Debug for Workers {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "Workers({} idle)", self.0.lock().idle.len())
+        let idle = lock(&self.0.state).idle.len();
+        write!(formatter, "Workers({idle} idle)")
     }
 }
 
@@ -88,7 +91,7 @@ impl Shared {
 
     /// The next job; none when the thread is to end.
     fn next(&self, slot: &Arc<ParkingSlot>, after: AfterWork) -> Option<Work> {
-        let mut state = self.lock();
+        let mut state = lock(&self.state);
         let waiting = state.waiting.pop_front();
         if waiting.is_some() || state.closed {
             drop(state);
@@ -99,11 +102,6 @@ impl Shared {
         drop(state);
         after();
         slot.wait()
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        // Nothing panics while it is held.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -131,12 +129,12 @@ struct ParkingSlot {
 
 impl ParkingSlot {
     fn give(&self, job: Option<Work>) {
-        *self.given.lock().unwrap_or_else(PoisonError::into_inner) = Some(job);
+        *lock(&self.given) = Some(job);
         self.filled.notify_one();
     }
 
     fn wait(&self) -> Option<Work> {
-        let mut given = self.given.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut given = lock(&self.given);
         loop {
             if let Some(job) = given.take() {
                 return job;

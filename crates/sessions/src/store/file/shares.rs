@@ -6,8 +6,8 @@
 use super::super::record::SessionName;
 use super::super::session_store::{Counted, StoreShare};
 use crate::clock::Clock;
+use crate::sync::{Mutex, lock};
 use std::collections::HashMap;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// A session that was counted so lately need not be written yet.
@@ -35,14 +35,9 @@ impl Shares {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, HashMap<String, Vec<Member>>> {
-        // No code that holds it can panic halfway through a change.
-        self.clients.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Counts a session, where its client has room for it.
     pub(super) fn admit(&self, share: &StoreShare, session: Counted) -> bool {
-        let mut clients = self.lock();
+        let mut clients = lock(&self.clients);
         let members = clients.entry(share.client.clone()).or_default();
         let all = || {
             members
@@ -62,7 +57,7 @@ impl Shares {
 
     /// The sessions of a client whose records may have expired.
     pub(super) fn doubtful(&self, client: &str) -> Vec<SessionName> {
-        let clients = self.lock();
+        let clients = lock(&self.clients);
         let members = clients.get(client).into_iter().flatten();
         let now = self.clock.now();
         let age = |member: &Member| now.saturating_sub(member.since);
@@ -72,7 +67,7 @@ impl Shares {
 
     /// Gives back the places of sessions that are not in the store any more.
     pub(super) fn remove(&self, gone: &[SessionName]) {
-        self.lock().retain(|_, members| {
+        lock(&self.clients).retain(|_, members| {
             members.retain(|member| !gone.contains(&member.session.name));
             !members.is_empty()
         });

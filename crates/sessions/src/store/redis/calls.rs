@@ -10,10 +10,11 @@ use super::script::{NewHash, Script, ScriptCall};
 use super::scripts::Scripts;
 use crate::clock::{Clock, sleep};
 use crate::random::random;
+use crate::sync::{Mutex, lock};
 use redis::FromRedisValue;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Weak};
 use std::time::Duration;
 use uuid::Uuid;
 
@@ -51,11 +52,6 @@ struct Shared {
 }
 
 impl Shared {
-    fn refused(&self) -> MutexGuard<'_, HashMap<String, Duration>> {
-        // Nothing panics while it is held.
-        self.refused.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     async fn probe(&self) {
         let key = format!("{}:probe", self.prefix);
         let write = self.scripts.probe.key(key);
@@ -173,8 +169,7 @@ impl RedisStore {
     /// Whether no room was found for a client a moment ago.
     fn is_refused(&self, client: &str) -> bool {
         let now = self.0.clock.now();
-        self.0
-            .refused()
+        lock(&self.0.refused)
             .get(client)
             .is_some_and(|until| *until > now)
     }
@@ -182,7 +177,7 @@ impl RedisStore {
     /// Refuses a client for a moment.
     fn refuse(&self, client: &str) {
         let now = self.0.clock.now();
-        let mut refused = self.0.refused();
+        let mut refused = lock(&self.0.refused);
         refused.retain(|_, until| *until > now);
         refused.insert(client.to_owned(), now + REFUSED);
     }
@@ -324,7 +319,7 @@ impl SessionStore for RedisStore {
         Box::pin(async move {
             let ended = self.0.connection.call(script).await?;
             // Its client has room again; who that is, is not known here.
-            self.0.refused().clear();
+            lock(&self.0.refused).clear();
             Ok(ended)
         })
     }

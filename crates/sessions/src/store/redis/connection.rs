@@ -4,12 +4,13 @@ use super::super::session_store::StoreUnavailable;
 use super::address::{Kind, RedisAddress};
 use super::script::{ScriptCall, ScriptServer};
 use crate::clock::{self, sleep, timeout_at};
+use crate::sync::{Mutex, lock};
 use redis::aio::{ConnectionManager, ConnectionManagerConfig};
 use redis::cluster::ClusterConfig;
 use redis::cluster_async::ClusterConnection;
 use redis::{ErrorKind, FromRedisValue, RedisError, RedisResult, ServerErrorKind, Value};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// Between two attempts of one call.
@@ -115,7 +116,7 @@ impl Connection {
         let deadline = clock::now() + self.timeout;
         let mut reason: Option<RedisError> = None;
         while clock::now() < deadline {
-            let (number, mut link) = self.lock().clone();
+            let (number, mut link) = lock(&self.link).clone();
             match timeout_at(deadline, link.send(script)).await {
                 Ok(Ok(value)) => {
                     self.answers();
@@ -156,17 +157,12 @@ impl Connection {
 
     /// Makes another link in place of the one of this number.
     fn replace(&self, number: u64) {
-        let mut link = self.lock();
+        let mut link = lock(&self.link);
         if link.0 == number
             && let Ok(new) = Link::new(&self.address, self.timeout)
         {
             *link = (number + 1, new);
         }
-    }
-
-    fn lock(&self) -> std::sync::MutexGuard<'_, (u64, Link)> {
-        // Nothing panics while it is held.
-        self.link.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Asks the store whether it is there and takes this write.
@@ -177,7 +173,7 @@ impl Connection {
         &self,
         write: ScriptCall<'_>,
     ) -> Result<T, StoreUnavailable> {
-        let (number, _) = *self.lock();
+        let (number, _) = *lock(&self.link);
         let probed = self.attempt(&write).await;
         let has_refused = self.refuses.swap(probed.is_err(), Ordering::AcqRel);
         if has_refused && probed.is_ok() {
