@@ -26,8 +26,8 @@ pub struct SessionName {
     pub incarnation: u64,
 }
 
-/// Which state of a record a replica has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Which state of a record a replica has. The store in a folder writes it as it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Version {
     /// Goes up when a replica takes over a record whose last frames it does not have, or opens a stream.
     pub generation: u64,

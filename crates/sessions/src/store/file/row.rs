@@ -10,11 +10,7 @@ const FORMAT: u8 = 1;
 /// A row: all of a record but its state, which is written less often.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Row {
-    pub(super) generation: u64,
-    /// The last frame that was answered.
-    pub(super) frame: u64,
-    /// The last frame whose state was written.
-    pub(super) checkpoint: u64,
+    pub(super) version: Version,
     pub(super) incarnation: u64,
     /// When the time to live is over, in milliseconds of the folder's time.
     pub(super) expires: u64,
@@ -27,15 +23,8 @@ pub(super) struct Row {
 impl Row {
     /// Of a new record.
     pub(super) fn of(record: &Record, expires: u64) -> Self {
-        let Version {
-            generation,
-            frame,
-            checkpoint,
-        } = record.version;
         Self {
-            generation,
-            frame,
-            checkpoint,
+            version: record.version,
             incarnation: record.opening.incarnation,
             expires,
             state_bytes: record.state.len() as u64,
@@ -45,7 +34,8 @@ impl Row {
 
     /// Whether this is the record's newest version.
     pub(super) fn is_at(&self, version: Version) -> bool {
-        (self.generation, self.frame) == (version.generation, version.frame)
+        let own = self.version;
+        (own.generation, own.frame) == (version.generation, version.frame)
     }
 
     /// A format number, then the content in postcard's encoding.
@@ -62,7 +52,7 @@ impl Row {
             Some((&FORMAT, content)) => {
                 let row: Self =
                     postcard::from_bytes(content).map_err(|_| UnreadableRecord::Damaged)?;
-                match Version::is_generation(row.generation) {
+                match Version::is_generation(row.version.generation) {
                     true => Ok(row),
                     false => Err(UnreadableRecord::Damaged),
                 }
@@ -77,13 +67,13 @@ impl Row {
 
     /// Whether there are frames after the checkpoint.
     pub(super) fn is_behind(&self) -> bool {
-        self.frame != self.checkpoint
+        self.version.frame != self.version.checkpoint
     }
 
     /// The next generation begins at the checkpoint: a replica goes on from there.
     pub(super) fn take_over(&mut self) {
-        self.generation += 1;
-        self.frame = self.checkpoint;
+        self.version = self.version.fenced();
+        self.version.frame = self.version.checkpoint;
     }
 
     /// The record at its checkpoint. `state` is that which the database has: the number of its frame, and its bytes.
@@ -97,11 +87,15 @@ impl Row {
     ) -> Result<Record, UnreadableRecord> {
         let state = state.and_then(<[u8]>::split_first_chunk);
         let (frame, state) = state.ok_or(UnreadableRecord::Damaged)?;
-        if u64::from_be_bytes(*frame) != self.checkpoint {
+        let Version {
+            generation,
+            checkpoint,
+            ..
+        } = self.version;
+        if u64::from_be_bytes(*frame) != checkpoint {
             return Err(UnreadableRecord::Damaged);
         }
         let ttl = Duration::from_millis(self.expires.saturating_sub(now));
-        let (generation, checkpoint) = (self.generation, self.checkpoint);
         Record::at_checkpoint(generation, checkpoint, &self.head, state.to_vec(), ttl)
     }
 }
@@ -147,7 +141,7 @@ mod tests {
         for state in [Some(&of_other_frame[..]), Some(&[1, 2]), None] {
             assert_eq!(row.record(state, 0), Err(UnreadableRecord::Damaged));
         }
-        row.generation = u64::MAX;
+        row.version.generation = u64::MAX;
         assert_eq!(
             Row::from_bytes(&row.to_bytes()),
             Err(UnreadableRecord::Damaged)

@@ -191,10 +191,9 @@ impl Transaction<'_> {
         if !row.is_at(commit.before) {
             return self.tell(id, row, commit.takes_over);
         }
-        row.frame = commit.frame;
+        row.version = row.version.committed(commit.frame, commit.state.is_some());
         row.expires = self.expiry(commit.ttl);
         if let Some(state) = &commit.state {
-            row.checkpoint = commit.frame;
             row.state_bytes = state.len() as u64;
             self.put_state(id, commit.frame, state);
         }
@@ -230,7 +229,7 @@ impl Transaction<'_> {
         if !row.is_at(version) {
             return self.tell(name.id, row, true);
         }
-        row.generation += 1;
+        row.version = row.version.fenced();
         self.put(name.id, &row);
         self.written.promises = true;
         Ok(Outcome::Committed(self.time_left(&row)))
