@@ -71,32 +71,27 @@ async fn probe(store: Weak<Shared>) {
 }
 
 /// What scripts answer.
-struct Answer(Outcome);
-
-impl FromRedisValue for Answer {
+impl FromRedisValue for Outcome {
     fn from_redis_value(value: redis::Value) -> Result<Self, redis::ParsingError> {
         let parts: Vec<redis::Value> = FromRedisValue::from_redis_value(value)?;
         let mut parts = parts.into_iter();
         let mut next = || parts.next().ok_or("too few values");
-        let kind = i64::from_redis_value(next()?)?;
-        if kind == 0 {
-            return Ok(Self(Outcome::NotFound));
+        match i64::from_redis_value(next()?)? {
+            0 => Ok(Self::NotFound),
+            3 => Ok(Self::Tombstoned),
+            4 => Ok(Self::Full),
+            kind => {
+                let ttl = i64::from_redis_value(next()?)?;
+                let ttl = Duration::from_millis(u64::try_from(ttl).unwrap_or(0));
+                if kind == 1 {
+                    return Ok(Self::Committed(ttl));
+                }
+                let (generation, checkpoint, head, state) = Fields::from_redis_value(next()?)?;
+                let record = Record::at_checkpoint(generation, checkpoint, &head, state, ttl);
+                let record = record.map_err(|error| error.to_string())?;
+                Ok(Self::Conflict(Box::new(record)))
+            }
         }
-        if kind == 4 {
-            return Ok(Self(Outcome::Full));
-        }
-        if kind == 3 {
-            return Ok(Self(Outcome::Tombstoned));
-        }
-        let ttl = i64::from_redis_value(next()?)?;
-        let ttl = Duration::from_millis(u64::try_from(ttl).unwrap_or(0));
-        if kind == 1 {
-            return Ok(Self(Outcome::Committed(ttl)));
-        }
-        let (generation, checkpoint, head, state) = Fields::from_redis_value(next()?)?;
-        let record = Record::at_checkpoint(generation, checkpoint, &head, state, ttl);
-        let record = record.map_err(|error| error.to_string())?;
-        Ok(Self(Outcome::Conflict(Box::new(record))))
     }
 }
 
@@ -125,11 +120,6 @@ impl RedisStore {
         shared.probe().await;
         tokio::spawn(probe(Arc::downgrade(&shared)));
         Ok(Self(shared))
-    }
-
-    async fn about_record(&self, script: ScriptCall<'_>) -> Result<Outcome, StoreUnavailable> {
-        let Answer(outcome) = self.0.connection.call(script).await?;
-        Ok(outcome)
     }
 
     /// Milliseconds since 1970.
@@ -226,7 +216,7 @@ impl SessionStore for RedisStore {
         script.arg(record.head()).arg(&record.state[..]);
         script.arg(milliseconds(record.ttl));
         Box::pin(async move {
-            let outcome = self.about_record(script).await?;
+            let outcome: Outcome = self.0.connection.call(script).await?;
             let is_full = outcome == Outcome::Full;
             self.0.is_full.store(is_full, Ordering::Relaxed);
             Ok(outcome)
@@ -262,12 +252,10 @@ impl SessionStore for RedisStore {
         script.key(self.key(id));
         script.arg("").arg("").arg("");
         Box::pin(async move {
-            Ok(match self.about_record(script).await? {
-                Outcome::Conflict(record) => Some(*record),
-                Outcome::NotFound | Outcome::Tombstoned | Outcome::Full | Outcome::Committed(_) => {
-                    None
-                }
-            })
+            match self.0.connection.call(script).await? {
+                Outcome::Conflict(record) => Ok(Some(*record)),
+                _ => Ok(None),
+            }
         })
     }
 
@@ -288,7 +276,7 @@ impl SessionStore for RedisStore {
         script.arg(commit.frame).arg(token);
         script.arg(milliseconds(commit.ttl));
         script.arg(if commit.takes_over { "1" } else { "" });
-        Box::pin(self.about_record(script))
+        Box::pin(self.0.connection.call(script))
     }
 
     fn check(
@@ -304,13 +292,13 @@ impl SessionStore for RedisStore {
         if let Some(ttl) = renew {
             script.arg(milliseconds(ttl));
         }
-        Box::pin(self.about_record(script))
+        Box::pin(self.0.connection.call(script))
     }
 
     fn fence(&self, name: SessionName, version: Version) -> StoreFuture<'_, Outcome> {
         let mut script = self.on(&self.0.scripts.fence, name);
         script.arg(version.generation).arg(version.frame);
-        Box::pin(self.about_record(script))
+        Box::pin(self.0.connection.call(script))
     }
 
     fn end(&self, name: SessionName, ttl: Duration) -> StoreFuture<'_, bool> {
