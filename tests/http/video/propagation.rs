@@ -9,28 +9,30 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use tempfile::TempDir;
 
 const FRAMES: u64 = 60;
 /// In frame 30: the target of the sample clip, and a piece of its ground.
 const BOXES: [&str; 2] = ["55,72,46,58", "200,30,40,40"];
 
 /// The sample clip as an MP4 with B-frames, so that the order of decoding is not that of showing; from frame 45 on it is
-/// an empty scene.
-fn clip(folder: &Path) -> PathBuf {
-    let frames = command::clip(folder, "clip", &["--frames", "60"]);
+/// an empty scene. It goes with its folder.
+fn clip() -> (TempDir, PathBuf) {
+    let folder = command::folder();
+    let frames = command::clip(folder.path(), "clip", &["--frames", "60"]);
     let empty = image::GrayImage::from_pixel(320, 240, image::Luma([128]));
     for index in 46..=FRAMES {
         empty
             .save(frames.join(format!("img/{index:04}.jpg")))
             .unwrap();
     }
-    let video = folder.join("clip.mp4");
+    let video = folder.path().join("clip.mp4");
     let mut ffmpeg = Command::new("ffmpeg");
     ffmpeg.args(["-v", "error", "-framerate", "30", "-i"]);
     ffmpeg.arg(frames.join("img/%04d.jpg"));
     ffmpeg.args(["-pix_fmt", "yuv420p", "-bf", "2"]);
     assert!(ffmpeg.arg(&video).status().unwrap().success());
-    video
+    (folder, video)
 }
 
 /// The settings of the service that say the same as these flags of the command.
@@ -84,8 +86,7 @@ fn check_same(answer: &Value, row: &Value) {
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn a_box_goes_through_a_video_as_with_the_command() {
-    let folder = tempfile::tempdir().unwrap();
-    let video = clip(folder.path());
+    let (_folder, video) = clip();
     let app = TestApplication::start().await;
     for (flags, least) in [
         ("--start 30", 30),
@@ -112,8 +113,7 @@ async fn a_box_goes_through_a_video_as_with_the_command() {
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn the_lines_of_several_targets_are_the_key_frames_of_each() {
-    let folder = tempfile::tempdir().unwrap();
-    let video = clip(folder.path());
+    let (_folder, video) = clip();
     let app = TestApplication::start().await;
     let boxes = BOXES.join(";");
     let query = [
@@ -153,8 +153,7 @@ fn file(video: &Path, format: &str, flags: &[&str]) -> String {
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn a_video_is_answered_by_the_file_that_the_command_writes() {
-    let folder = tempfile::tempdir().unwrap();
-    let video = clip(folder.path());
+    let (_folder, video) = clip();
     let app = TestApplication::start().await;
     let both = BOXES.join(";");
     let named = ["--box", BOXES[1], "--name", "a <van>", "--name", "ground"];
@@ -215,8 +214,7 @@ async fn a_video_is_answered_by_the_file_that_the_command_writes() {
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn a_file_of_a_damaged_video_is_had_of_the_frames_before_the_damage() {
-    let folder = tempfile::tempdir().unwrap();
-    let video = clip(folder.path());
+    let (_folder, video) = clip();
     let app = TestApplication::start().await;
     let mut bytes = std::fs::read(&video).unwrap();
     let middle = bytes.len() / 2;
@@ -241,8 +239,7 @@ async fn a_file_of_a_damaged_video_is_had_of_the_frames_before_the_damage() {
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn a_file_that_cannot_be_written_is_refused_before_the_video_is_tracked() {
-    let folder = tempfile::tempdir().unwrap();
-    let video = clip(folder.path());
+    let (folder, video) = clip();
     let app = TestApplication::start().await;
     let both = BOXES.join(";");
     let one = ("box", BOXES[0]);
@@ -281,8 +278,7 @@ async fn a_file_that_cannot_be_written_is_refused_before_the_video_is_tracked() 
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn frames_that_are_kept_for_the_way_back_are_charged_as_uploads() {
-    let folder = tempfile::tempdir().unwrap();
-    let video = clip(folder.path());
+    let (_folder, video) = clip();
     let size = usize::try_from(video.metadata().unwrap().len()).unwrap();
     // The video fits, and some ten frames of some 14 KiB.
     let app = TestApplication::start_with(|config| {
@@ -306,8 +302,7 @@ async fn frames_that_are_kept_for_the_way_back_are_charged_as_uploads() {
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn a_frame_that_is_not_there_and_frames_in_place_of_a_video_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let video = clip(folder.path());
+    let (folder, video) = clip();
     let app = TestApplication::start().await;
     for (query, word) in [
         (("start", "60"), "no frame 60: it has 60"),
