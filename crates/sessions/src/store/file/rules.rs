@@ -55,7 +55,7 @@ impl Transaction<'_> {
         let row = bytes
             .map_err(Fault::from)
             .and_then(|bytes| Ok(bytes.map(|bytes| Row::from_bytes(&bytes)).transpose()?));
-        let row = self.unless_damaged(id, row.transpose())?;
+        let row = self.unless_damaged(id, row)?;
         Ok(row.filter(|row| row.expires > self.now))
     }
 
@@ -75,9 +75,9 @@ impl Transaction<'_> {
     fn unless_damaged<T>(
         &mut self,
         id: Uuid,
-        read: Option<Result<T, Fault>>,
+        read: Result<Option<T>, Fault>,
     ) -> Result<Option<T>, Fault> {
-        match read.transpose() {
+        match read {
             Err(fault) if fault.is_damage() => {
                 let session = crate::short_id(id);
                 tracing::error!(session, reason = %fault, "a session in the store is damaged, and lost");
@@ -128,7 +128,7 @@ impl Transaction<'_> {
     /// The record of a row; none if it is damaged.
     fn record(&mut self, id: Uuid, row: &Row) -> Result<Option<Record>, Fault> {
         let read = self.read_record(id, row);
-        self.unless_damaged(id, Some(read))
+        self.unless_damaged(id, read.map(Some))
     }
 
     fn read_record(&self, id: Uuid, row: &Row) -> Result<Record, Fault> {
