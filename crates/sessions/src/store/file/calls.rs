@@ -10,7 +10,6 @@ use super::rules::Fault;
 use super::shares::Shares;
 use super::writer::{Call, Health, Ruled, Writer};
 use crate::clock::{Clock, timeout};
-use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -49,10 +48,7 @@ impl FileStore {
         let (sender, calls) = channel();
         let thread = std::thread::Builder::new().name("bagtrack-store".to_owned());
         let thread = thread.spawn(move || writer.run(&calls));
-        let thread = thread.map_err(|source: io::Error| OpenError::Io {
-            folder: folder.to_owned(),
-            source,
-        })?;
+        let thread = thread.map_err(|source| OpenError::io(folder, source))?;
         Ok(Self {
             calls: Some(sender),
             thread: Some(thread),

@@ -71,6 +71,11 @@ pub enum OpenError {
 }
 
 impl OpenError {
+    pub(super) fn io(folder: &Path, source: io::Error) -> Self {
+        let folder = folder.to_owned();
+        Self::Io { folder, source }
+    }
+
     pub(super) fn of(folder: &Path, error: fjall::Error) -> Self {
         let folder = folder.to_owned();
         match error {
@@ -148,10 +153,7 @@ impl Database {
     pub(super) fn open(folder: &Path) -> Result<Self, OpenError> {
         let written = make_folder(folder)
             .and_then(|()| journals(folder))
-            .map_err(|source| OpenError::Io {
-                folder: folder.to_owned(),
-                source,
-            })?;
+            .map_err(|source| OpenError::io(folder, source))?;
         // Damaged files may break an assumption of the database.
         let opened = catch_unwind(AssertUnwindSafe(|| Self::open_unguarded(folder)));
         let opened = opened.map_err(|_| OpenError::Damaged {
@@ -180,10 +182,7 @@ impl Database {
     /// # Errors
     /// See [`OpenError`].
     pub(super) fn open_again(folder: &Path) -> Result<Self, OpenError> {
-        let error = |source| OpenError::Io {
-            folder: folder.to_owned(),
-            source,
-        };
+        let error = |source| OpenError::io(folder, source);
         if journals(folder).map_err(error)?.is_empty() {
             return Err(error(io::Error::new(io::ErrorKind::NotFound, GONE)));
         }
