@@ -3,19 +3,10 @@
 use crate::good::{GoodClients, frames};
 use crate::target::Target;
 use crate::{Options, Outcome, Verdict};
-use image::{DynamicImage, ImageFormat, RgbImage};
+use bagtrack_testing::picture_files::bomb;
 use reqwest::multipart::{Form, Part};
-use std::io::Cursor;
 use std::time::Instant;
 use tokio::task::JoinSet;
-
-/// A lossless WebP of equal pixels.
-pub fn bomb() -> Outcome<Vec<u8>> {
-    let picture = RgbImage::from_pixel(8192, 4094, image::Rgb([77; 3]));
-    let mut bytes = Cursor::new(Vec::new());
-    DynamicImage::ImageRgb8(picture).write_to(&mut bytes, ImageFormat::WebP)?;
-    Ok(bytes.into_inner())
-}
 
 /// A form with a picture so many times.
 pub fn form(picture: &[u8], count: usize) -> Form {
@@ -58,7 +49,7 @@ pub async fn flood(
 
 pub async fn attack(target: &Target, options: &Options) -> Outcome<Verdict> {
     let good = GoodClients::start(target, 4).await?;
-    let (sent, taken) = flood(target, options, &bomb()?, "").await?;
+    let (sent, taken) = flood(target, options, &bomb(), "").await?;
     let seen = format!("{sent} requests with 64 bombs, {taken} not answered with 422");
     good.verdict(taken == 0 && sent > 0, seen).await
 }

@@ -9,10 +9,11 @@
 //! what the service and the good clients leave, which still keeps every worker busy.
 
 use crate::costly_sessions::QUERY;
-use crate::decode_bombs::{bomb, form};
+use crate::decode_bombs::form;
 use crate::good::{GoodClients, PERIOD, Tally, frames};
 use crate::target::Target;
 use crate::{Options, Outcome, Verdict, raw};
+use bagtrack_testing::picture_files::bomb;
 use futures_util::{SinkExt, StreamExt};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -158,7 +159,7 @@ fn start_attackers(target: &Target, options: &Options, seconds: u64) -> Outcome<
 /// What the attackers do, for `options.seconds`.
 pub async fn attackers(target: &Target, options: &Options) -> Outcome<()> {
     let end = Instant::now() + Duration::from_secs(options.seconds);
-    let uploads = Arc::new((frames()?, bomb()?));
+    let uploads = Arc::new((frames()?, bomb()));
     let mut clients = JoinSet::new();
     for number in 0..CLIENTS {
         let target = target.same();

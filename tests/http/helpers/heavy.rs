@@ -5,11 +5,12 @@ use crate::helpers::raw::RawConnection;
 use crate::pictures;
 use crate::requests::forms::form;
 use bagtrack_testing::within::within;
-use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb, RgbImage};
+use image::{GrayImage, ImageFormat, Luma};
 use reqwest::multipart::Form;
 use reqwest::{Method, RequestBuilder, StatusCode};
-use std::io::Cursor;
 use tokio::task::JoinSet;
+
+pub use bagtrack_testing::picture_files::bomb;
 
 /// Frames of one request that take the worker some seconds.
 pub const FRAMES: usize = 200;
@@ -17,15 +18,6 @@ pub const FRAMES: usize = 200;
 /// The most expensive parameters.
 pub const PARAMS: &str = r#"{"particles": 260, "patch_width": 64, "patch_height": 64, "bag_size": 32,
     "update_every": 1, "history": 10, "basis_dim": 6}"#;
-
-/// A lossless WebP of 8192 x 4094 equal pixels: some kilobytes that take a worker tenths of a second, in one piece.
-pub fn bomb() -> Vec<u8> {
-    let picture = RgbImage::from_pixel(8192, 4094, Rgb([77; 3]));
-    let mut bytes = Cursor::new(Vec::new());
-    let picture = DynamicImage::ImageRgb8(picture);
-    picture.write_to(&mut bytes, ImageFormat::WebP).unwrap();
-    bytes.into_inner()
-}
 
 /// A picture of 40 megapixels.
 pub fn large(value: u8) -> Vec<u8> {
