@@ -10,10 +10,10 @@ use super::places::Places;
 use super::work_limit::{CpuSpent, Stopped, WorkLimit, WorkMeter};
 use super::workers::Workers;
 use crate::clock;
-use crate::interleavings::explore;
+use crate::interleavings::{explore, join};
 use crate::sync::atomic::{AtomicUsize, Ordering};
 use crate::sync::lock;
-use crate::sync::thread::{self, JoinHandle};
+use crate::sync::thread;
 use futures_util::future::{Either, select};
 use shuttle::future::block_on;
 use std::pin::pin;
@@ -35,12 +35,6 @@ fn assert_happened(seen: &Seen, what: &str) {
     let times = seen.load(Ordering::Relaxed);
     println!("{what}: {times} times");
     assert!(times > 0, "in no order: {what}");
-}
-
-fn join(threads: Vec<JoinHandle<()>>) {
-    for thread in threads {
-        thread.join().expect("a thread of the test");
-    }
 }
 
 /// Works that have a worker of each class, of which there are `most`.
@@ -115,7 +109,7 @@ fn every_work_that_entered_runs_once_and_nothing_stays_taken() {
                 }
             })
         });
-        join(clients.collect());
+        join(clients.collect::<Vec<_>>());
         assert_eq!(admission.busy_workers(), 0, "answered work has ended");
         assert_idle(&admission, PLACES);
     });
@@ -297,7 +291,7 @@ fn every_job_runs_once_and_then_the_threads_end() {
             })
         });
         drop(workers);
-        join(threads.into());
+        join(threads);
         // Their threads end once nothing waits: what they had of the jobs is dropped.
         while Arc::strong_count(&runs) > 1 {
             thread::yield_now();
@@ -331,7 +325,7 @@ fn no_budget_is_ever_above_its_maximum_and_all_is_given_back() {
                 drop(charge);
             })
         });
-        join(threads.collect());
+        join(threads.collect::<Vec<_>>());
         assert_eq!((all.held(), network.held()), (0, 0));
         assert!(clients.iter().all(|client| client.held() == 0));
     });
