@@ -3,7 +3,7 @@
 use super::frame::frame;
 use super::model::PyNanoTrack;
 use super::params::{by_name, extract_seed, params};
-use super::target::{Numbers, extract_target, numbers, rect};
+use super::target::{Numbers, box_in, extract_target, numbers};
 use bagtrack_tracker::{Estimate, Expert, Params, Search, Status, Tracker, TrackerError};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -81,7 +81,8 @@ impl PyTracker {
         frame: &Bound<'_, PyAny>,
         r#box: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
-        let (frame, target) = (self::frame(frame)?, rect(r#box)?);
+        let frame = self::frame(frame)?;
+        let target = box_in(&frame, r#box)?;
         let expert = expert(self.model.as_ref());
         py.detach(|| {
             let tracker = Tracker::beside(&frame, target, self.params.clone(), expert);
@@ -119,7 +120,8 @@ impl PyTracker {
         frame: &Bound<'_, PyAny>,
         r#box: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
-        let (frame, target) = (self::frame(frame)?, rect(r#box)?);
+        let frame = self::frame(frame)?;
+        let target = box_in(&frame, r#box)?;
         self.change(py, |tracker| tracker.retarget(&frame, target))?;
         Ok(())
     }

@@ -201,6 +201,13 @@ def test_what_is_no_frame_and_no_box_is_said_and_changes_nothing(clip: Clip) -> 
             tracker.init(frames[0], box)
     with pytest.raises(ValueError, match="the box is too small"):
         tracker.init(frames[0], (10, 10, 2, 20))
+    # Two corners, shares of the frame, and corners that may be a box.
+    with pytest.raises(ValueError, match="looks like x1,y1,x2,y2.*box=300,200,18,38"):
+        tracker.init(frames[0], (300, 200, 318, 238))
+    with pytest.raises(ValueError, match="looks like fractions.*box=160,120,64,48"):
+        tracker.init(frames[0], (0.5, 0.5, 0.2, 0.2))
+    with pytest.warns(UserWarning, match="If it is x1,y1,x2,y2.*box=100,80,140,120"):
+        tracker.init(frames[0], (100, 80, 240, 200))
     tracker.init(frames[0], clip.box)
     bad = [
         (frames[1].astype(np.float32), ValueError, "dtype uint8, not float32"),
@@ -216,6 +223,8 @@ def test_what_is_no_frame_and_no_box_is_said_and_changes_nothing(clip: Clip) -> 
             tracker.update(frame)
     with pytest.raises(ValueError, match="the box is outside the frame"):
         tracker.retarget(frames[1], (5000, 5000, 40, 40))
+    with pytest.raises(ValueError, match="looks like x1,y1,x2,y2"):
+        tracker.retarget(frames[1], (300, 200, 318, 238))
     with pytest.raises(ValueError, match="the snapshot"):
         bagtrack.Tracker.load(b"no snapshot")
     assert [tracker.update(frame)[1] for frame in frames[1:6]] == clip.boxes()[1:6]

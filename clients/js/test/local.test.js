@@ -128,6 +128,9 @@ test("what cannot be used is refused, and changes nothing", async () => {
   await assert.rejects(session.track({ ...images[1], data: images[1].data.subarray(4) }), slug("frame-damaged"));
   await assert.rejects(session.correct(images[1], { ...box, width: 1 }), slug("invalid-box"));
   await assert.rejects(local.open(images[0], { ...box, x: NaN }), slug("invalid-box"));
+  // Two corners, and shares of the frame.
+  await assert.rejects(local.open(images[0], { x: 300, y: 200, width: 318, height: 238 }), /box=300,200,18,38/);
+  await assert.rejects(session.correct(images[1], { x: 0.5, y: 0.5, width: 0.2, height: 0.2 }), /box=160,120,64,48/);
   await assert.rejects(local.open(images[0], box, { parameters: { particles: 1e6 } }), slug("invalid-parameter"));
   await assert.rejects(local.open(images[0], box, { parameters: { nothing: 1 } }), slug("invalid-parameter"));
   const plain = await local.open(images[0], box, { seed: SEED });

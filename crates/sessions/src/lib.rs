@@ -47,9 +47,9 @@ mod targets;
 
 pub use acts::{
     ActError, CreationKey, FrameBatch, FrameFault, FramesError, GivenBox, IdempotencyStore,
-    ImplausibleBox, KEPT_ANSWERS, OpenError, OpenRequest, Opened, QuotaExhausted, RequestLimits,
-    ServiceParts, ServiceSettings, SessionQuota, SessionService, Start, TrackError, TrackFrom,
-    Tracked, TrackedAway, TrackingMetrics, box_warnings, check_readable_pixels,
+    KEPT_ANSWERS, OpenError, OpenRequest, Opened, QuotaExhausted, RequestLimits, ServiceParts,
+    ServiceSettings, SessionQuota, SessionService, Start, TrackError, TrackFrom, Tracked,
+    TrackedAway, TrackingMetrics, check_readable_pixels,
 };
 pub use clock::Clock;
 pub use insertion::InsertError;

@@ -3,7 +3,7 @@
 use crate::estimate::{WasmEstimate, WasmSeen};
 use crate::frame::WasmFrame;
 use crate::parameters::WasmParameters;
-use bagtrack_tracker::{BagEntry, Rect, Tracker};
+use bagtrack_tracker::{BagEntry, Rect, Tracker, check_box};
 use wasm_bindgen::prelude::*;
 
 /// Follows one object.
@@ -24,7 +24,7 @@ impl WasmTracker {
         parameters: &WasmParameters,
     ) -> Result<WasmTracker, JsError> {
         let params = parameters.0.clone();
-        Ok(Self(Tracker::new(&frame.0, rect(target)?, params)?))
+        Ok(Self(Tracker::new(&frame.0, rect(frame, target)?, params)?))
     }
 
     /// A tracker that goes on from the bytes of `save`, here or elsewhere.
@@ -62,7 +62,7 @@ impl WasmTracker {
     /// # Errors
     /// As for `step` and `new`.
     pub fn correct(&mut self, frame: &WasmFrame, target: &[f64]) -> Result<WasmEstimate, JsError> {
-        Ok(self.0.retarget(&frame.0, rect(target)?)?.into())
+        Ok(self.0.retarget(&frame.0, rect(frame, target)?)?.into())
     }
 
     /// The last answer.
@@ -114,9 +114,11 @@ impl WasmEntry {
     }
 }
 
-fn rect(values: &[f64]) -> Result<Rect, JsError> {
-    match *values {
-        [x, y, width, height] => Ok(Rect::new(x, y, width, height)),
-        _ => Err(JsError::new("a box has four numbers")),
-    }
+fn rect(frame: &WasmFrame, values: &[f64]) -> Result<Rect, JsError> {
+    let [x, y, width, height] = *values else {
+        return Err(JsError::new("a box has four numbers"));
+    };
+    let target = Rect::new(x, y, width, height);
+    check_box(&target, frame.0.source_size())?;
+    Ok(target)
 }

@@ -5,11 +5,11 @@ use bagtrack_api::ProblemKind as Kind;
 use bagtrack_ingest::IngestError;
 use bagtrack_quotas::RateExceeded;
 use bagtrack_sessions::{
-    ActError, BudgetFull, FrameFault, FramesError, ImplausibleBox, NoSession, OpenError, QueueFull,
-    QuotaExhausted, ReplayError, SessionBusy, SnapshotError, StartError, Stopped, StoreUnavailable,
+    ActError, BudgetFull, FrameFault, FramesError, NoSession, OpenError, QueueFull, QuotaExhausted,
+    ReplayError, SessionBusy, SnapshotError, StartError, Stopped, StoreUnavailable,
     TooManySessions, TrackError, WorkPanicked,
 };
-use bagtrack_tracker::TrackerError;
+use bagtrack_tracker::{ImplausibleBox, TrackerError};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -87,7 +87,7 @@ impl From<TrackerError> for Problem {
 
 impl From<ImplausibleBox> for Problem {
     fn from(error: ImplausibleBox) -> Self {
-        Self::new(Kind::InvalidBox, error.to_string())
+        Self::new(Kind::InvalidBox, format!("{error}."))
     }
 }
 

@@ -11,7 +11,8 @@ use axum::response::Response;
 use bagtrack_api::Answer;
 use bagtrack_api::openapi::example_frames;
 use bagtrack_api::requests::{BinaryBody, FormBody, JsonBody, TargetSettings};
-use bagtrack_sessions::{FrameBatch, GivenBox, box_warnings};
+use bagtrack_sessions::{FrameBatch, GivenBox};
+use bagtrack_tracker::box_warnings;
 
 type TargetForm = FormBody<TargetSettings>;
 type TargetJson = JsonBody<TargetSettings>;

@@ -9,10 +9,8 @@ use crate::http::state::AppState;
 use axum::body::Bytes;
 use bagtrack_api::Answer;
 use bagtrack_quotas::Client;
-use bagtrack_sessions::{
-    Boxes, Estimates, QueuePermit, Selection, SessionState, Start, box_warnings,
-};
-use bagtrack_tracker::Params;
+use bagtrack_sessions::{Boxes, Estimates, QueuePermit, Selection, SessionState, Start};
+use bagtrack_tracker::{Params, box_warnings};
 use std::sync::Arc;
 
 /// A video that is tracked.

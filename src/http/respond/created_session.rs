@@ -7,7 +7,8 @@ use axum::http::header::LOCATION;
 use axum::response::Response;
 use bagtrack_api::CreatedSession;
 use bagtrack_api::requests::public_params;
-use bagtrack_sessions::{Opened, PerTarget, Session, box_warnings};
+use bagtrack_sessions::{Opened, PerTarget, Session};
+use bagtrack_tracker::box_warnings;
 use std::time::{Duration, SystemTime};
 
 fn description(session: &Session, is_verbose: bool) -> CreatedSession {

@@ -12,8 +12,9 @@ use bagtrack_quotas::Account;
 use bagtrack_sessions::clock::{self, Instant, sleep, timeout_at};
 use bagtrack_sessions::{
     ActError, FrameBatch, FramesError, KEPT_ANSWERS, QueueFull, QueuePermit, Session, SessionBusy,
-    SessionPermit, StreamPlace, box_warnings,
+    SessionPermit, StreamPlace,
 };
+use bagtrack_tracker::box_warnings;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use uuid::Uuid;

@@ -1,13 +1,12 @@
 //! Why an act was not done. None of them changes a session.
 
-use super::box_check::ImplausibleBox;
 use crate::store::StoreShare;
 use crate::{
     InsertError, NoSession, QueueFull, ReplayError, SessionBusy, SessionClosed, SnapshotError,
     StartError, Stopped, StoreUnavailable, TooManySessions, WorkPanicked,
 };
 use bagtrack_ingest::IngestError;
-use bagtrack_tracker::TrackerError;
+use bagtrack_tracker::{ImplausibleBox, TrackerError};
 
 /// Why an act was not done, whatever it was about.
 #[derive(Debug, Clone, thiserror::Error)]

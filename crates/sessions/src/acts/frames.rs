@@ -1,7 +1,6 @@
 //! The next frames of a session, as they were received: decode them, then track through them, or take the box that the
 //! user gives.
 
-use super::box_check;
 use super::error::{FrameFault, FramesError};
 use super::tracking_metrics::TrackingMetrics;
 use crate::replay::{Answered, replayed};
@@ -9,7 +8,7 @@ use crate::streams::StreamPlace;
 use crate::targets::TargetsError;
 use crate::{Correction, Estimates, Fingerprint, SessionState, WorkMeter};
 use bagtrack_ingest::{Inspected, Limits};
-use bagtrack_tracker::{Diagnostics, Rect, TrackerError};
+use bagtrack_tracker::{Diagnostics, Rect, TrackerError, check_box};
 use bytes::Bytes;
 use std::sync::Arc;
 
@@ -46,7 +45,7 @@ pub struct GivenBox {
 impl GivenBox {
     /// The correction in a session with so many targets and frames of this size.
     fn of(self, count: usize, size: (u32, u32)) -> Result<Correction, FramesError> {
-        box_check::check(&self.to, size)?;
+        check_box(&self.to, size)?;
         match self.target {
             None if count != 1 => Err(FramesError::NoSuchTarget { count }),
             Some(target) if target >= count => Err(FramesError::NoSuchTarget { count }),

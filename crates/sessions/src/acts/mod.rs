@@ -13,7 +13,6 @@
 //! between two frames, and its copy is dropped).
 
 mod advance;
-mod box_check;
 mod error;
 mod find;
 mod frames;
@@ -26,7 +25,6 @@ mod track;
 mod tracking_metrics;
 mod turn;
 
-pub use box_check::{ImplausibleBox, box_warnings};
 pub use error::{ActError, FrameFault, FramesError, OpenError, QuotaExhausted, TrackError};
 pub use frames::{
     FrameBatch, GivenBox, KEPT_ANSWERS, RequestLimits, Tracked, check_readable_pixels,

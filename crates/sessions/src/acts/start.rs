@@ -1,10 +1,9 @@
 //! What a session begins with.
 
-use super::box_check;
 use super::error::{FrameFault, FramesError, OpenError};
 use super::service::SessionService;
 use crate::{Boxes, Fingerprint, PerTarget, SessionState, StartError, WorkMeter, frame_format};
-use bagtrack_tracker::Params;
+use bagtrack_tracker::{Params, check_box};
 use bytes::Bytes;
 
 /// What a session begins with.
@@ -70,7 +69,7 @@ impl Start {
         let decoded = service.tracking.decoding(decode);
         let frame = &decoded.map_err(|error| FramesError::from(FrameFault::Ingest(error)))?;
         for (target, given) in boxes.as_slice().iter().enumerate() {
-            box_check::check(given, frame.source_size()).map_err(|error| OpenError::Box {
+            check_box(given, frame.source_size()).map_err(|error| OpenError::Box {
                 error,
                 listed: match boxes {
                     PerTarget::One(_) => None,

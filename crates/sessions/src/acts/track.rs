@@ -1,13 +1,12 @@
 //! Tracks without a session: from a first frame or a snapshot to a new snapshot.
 
 use super::advance::largest;
-use super::box_check::box_warnings;
 use super::error::{ActError, TrackError};
 use super::frames::{FrameBatch, GivenBox, RequestLimits, check_pixels};
 use super::service::SessionService;
 use super::start::Start;
 use crate::{Boxes, Estimates, QueuePermit, SessionState, WorkMeter};
-use bagtrack_tracker::Params;
+use bagtrack_tracker::{Params, box_warnings};
 use bytes::Bytes;
 
 /// Where a track without a session stands.

@@ -6,10 +6,10 @@ use crate::world::{
     post_numbered, request, service,
 };
 use bagtrack_sessions::{
-    ActError, Boxes, Clock, CreationKey, ImplausibleBox, NoSession, OpenError, Owner, Registry,
-    SessionService, Start, StartError, TooManySessions,
+    ActError, Boxes, Clock, CreationKey, NoSession, OpenError, Owner, Registry, SessionService,
+    Start, StartError, TooManySessions,
 };
-use bagtrack_tracker::Rect;
+use bagtrack_tracker::{ImplausibleBox, Rect};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 use uuid::Uuid;

@@ -1,24 +1,24 @@
 //! Boxes that are likely a mistake: in other units or by other corners. What cannot be meant is refused with a guess; a
 //! box that reaches far outside the frame is tracked, with a warning.
 
-use bagtrack_tracker::Rect;
+use crate::image::rect::Rect;
+use crate::input::MIN_BOX_SIDE;
 
 /// A box with more than this share of its area outside is warned of.
 const MAX_OUTSIDE: f64 = 0.5;
 /// The same, where it reads well as two corners.
 const MAX_OUTSIDE_AS_CORNERS: f64 = 0.01;
-/// The shortest side that a box by its corners has.
-const MIN_SIDE: f64 = 4.0;
 
 /// Width and height of a frame in pixels.
 type Size = (u32, u32);
 
 /// Why a box cannot be meant, with the box that may be.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ImplausibleBox {
     /// A side is negative.
     #[error(
-        "The box has a negative {side}. A box is x,y,width,height, and x,y is its top left corner."
+        "the box has a negative {side}: a box is x,y,width,height, and x,y is its top left corner"
     )]
     Negative {
         /// `width` or `height`.
@@ -26,7 +26,7 @@ pub enum ImplausibleBox {
     },
     /// It is in fractions of the frame.
     #[error(
-        "The box looks like fractions of the frame; send pixels. In this frame of {} x {} that is `box={pixels}`.",
+        "the box looks like fractions of the frame; give pixels: in this frame of {} x {} that is `box={pixels}`",
         size.0,
         size.1
     )]
@@ -38,8 +38,8 @@ pub enum ImplausibleBox {
     },
     /// It is two corners.
     #[error(
-        "{percent} % of the box lies outside the frame of {} x {}. It looks like x1,y1,x2,y2; send x,y,width,height: \
-         `box={pixels}`.",
+        "the box lies by {percent} % outside the frame of {} x {}, and looks like x1,y1,x2,y2; give x,y,width,height: \
+         `box={pixels}`",
         size.0,
         size.1
     )]
@@ -57,7 +57,7 @@ pub enum ImplausibleBox {
 ///
 /// # Errors
 /// A side is negative, the box is in fractions of the frame, or it is two corners and most of it lies outside.
-pub(super) fn check(target: &Rect, size: Size) -> Result<(), ImplausibleBox> {
+pub fn check_box(target: &Rect, size: Size) -> Result<(), ImplausibleBox> {
     let (width, height) = (f64::from(size.0), f64::from(size.1));
     if target.width < 0.0 || target.height < 0.0 {
         let side = if target.width < 0.0 {
@@ -109,7 +109,7 @@ fn warning(target: &Rect, size: Size) -> Option<String> {
         None => MAX_OUTSIDE,
     };
     let guess = corners.map_or(String::new(), |corners| {
-        format!(" If it is x1,y1,x2,y2, send x,y,width,height: `box={corners}`.")
+        format!(" If it is x1,y1,x2,y2, give x,y,width,height: `box={corners}`.")
     });
     (share > most).then(|| {
         let percent = percent(share);
@@ -133,8 +133,8 @@ fn as_corners(target: &Rect, (width, height): Size) -> Option<String> {
     let (x, y, right, bottom) = (target.x, target.y, target.width, target.height);
     let is_box = x >= 0.0
         && y >= 0.0
-        && right - x >= MIN_SIDE
-        && bottom - y >= MIN_SIDE
+        && right - x >= MIN_BOX_SIDE
+        && bottom - y >= MIN_BOX_SIDE
         && right <= width.into()
         && bottom <= height.into();
     is_box.then(|| shown(x, y, right - x, bottom - y))
@@ -170,7 +170,7 @@ mod tests {
             ([50.0, 50.0, -20.0, 30.0], "negative width"),
             ([50.0, 50.0, 20.0, -30.0], "negative height"),
         ] {
-            let error = check(&rect(sides), SIZE).unwrap_err().to_string();
+            let error = check_box(&rect(sides), SIZE).unwrap_err().to_string();
             assert!(error.contains(guess), "{error}");
         }
     }
@@ -187,7 +187,7 @@ mod tests {
             ([298.0, 160.0, 346.0, 240.0], Some("`box=298,160,48,80`")),
             ([0.0, 0.0, 640.0, 480.0], None),
         ] {
-            assert!(check(&rect(sides), SIZE).is_ok(), "{sides:?}");
+            assert!(check_box(&rect(sides), SIZE).is_ok(), "{sides:?}");
             let warnings = box_warnings(&[rect(sides)], SIZE);
             match warned {
                 None => assert_eq!(warnings, None, "{sides:?}"),
@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn each_bound_of_a_likely_mistake_holds_by_itself() {
-        let told = |sides| check(&rect(sides), SIZE).map_err(|error| error.to_string());
+        let told = |sides| check_box(&rect(sides), SIZE).map_err(|error| error.to_string());
         // A side of nothing is the tracker's to refuse.
         for sides in [[50.0, 50.0, 0.0, 30.0], [50.0, 50.0, 30.0, 0.0]] {
             assert_eq!(told(sides), Ok(()), "{sides:?}");
