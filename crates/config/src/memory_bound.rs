@@ -8,8 +8,11 @@ use bagtrack_net::MAX_UNSENT_BYTES;
 use bagtrack_sessions::{MAX_LIST_BYTES, threads_of};
 use bagtrack_tracker::MAX_WORKING_SIDE;
 
-/// Most bytes that a connection keeps of what it read, and of what it is to write. A stream's buffers take their place.
-pub const MAX_BUFFER_BYTES: usize = 64 << 10;
+/// Most bytes of a buffer of a connection, and so of the head of a request. A stream's buffers take their place.
+pub const MAX_BUFFER_BYTES: usize = 32 << 10;
+/// A connection may have as many: a head, a body that has begun behind it, the room for more of that, and what it is to
+/// write.
+const BUFFERS: u64 = 4;
 /// Connections beside `max_connections` on which addresses that have no more of those are asked for their health, and
 /// refused the rest.
 pub const PROBE_CONNECTIONS: usize = 32;
@@ -20,7 +23,7 @@ const WORKER: u64 = 64 << 20;
 /// The largest working image of a frame that waits for its turn in a request: luma, and chroma in half of its columns
 /// and rows.
 const WORKING_IMAGE: u64 = MAX_WORKING_SIDE as u64 * MAX_WORKING_SIDE as u64 * 3 / 2;
-/// A connection's tasks, beside its two buffers.
+/// A connection's tasks, beside its buffers.
 const CONNECTION: u64 = 16 << 10;
 /// What TLS keeps of a connection: what waits to be sent, a handshake message that is not whole, and a record's text.
 #[cfg(feature = "tls")]
@@ -96,7 +99,7 @@ impl MemoryBound {
 }
 
 fn connection(config: &Config) -> u64 {
-    let plain = 2 * MAX_BUFFER_BYTES as u64 + CONNECTION;
+    let plain = BUFFERS * MAX_BUFFER_BYTES as u64 + CONNECTION;
     #[cfg(feature = "tls")]
     if config.tls.tls_cert.is_some() {
         return plain + TLS_CONNECTION;

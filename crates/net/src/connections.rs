@@ -110,15 +110,6 @@ impl Connections {
         Ok(self.admit(&mut open, client))
     }
 
-    /// Takes a place for a connection from `address` where one is free, and closes none for it.
-    pub fn enter_free(self: &Arc<Self>, address: IpAddr) -> Option<ConnectionPermit> {
-        let client = customer_address(address);
-        let mut open = self.open();
-        let free = self.max.saturating_sub(open.connections.len());
-        let is_free = free > 0 && self.leaves_room(&open, client, free);
-        is_free.then(|| self.admit(&mut open, client))
-    }
-
     fn admit(self: &Arc<Self>, open: &mut Open, client: IpAddr) -> ConnectionPermit {
         let number = open.next;
         open.next += 1;

@@ -139,15 +139,23 @@ impl<S> Fragments<S> {
         self.is_within || self.fragment_left > 0 || !self.input.is_empty()
     }
 
-    /// Waits for the client's turn to send one more frame, where its next one has come.
-    fn poll_frame_rate(&mut self, cx: &mut Context<'_>) -> Poll<()> {
+    /// Waits for the client's turn to send one more frame, where its next one has come. A message that has begun has no
+    /// more time for it: else one of empty frames would never end.
+    ///
+    /// # Errors
+    /// The message is too slow.
+    fn poll_frame_rate(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), MessageTooSlow>> {
         if self.frame.is_some() || self.input.len() < 2 {
-            return Poll::Ready(());
+            return Poll::Ready(Ok(()));
         }
         let Err(early) = self.messages.check() else {
-            return Poll::Ready(());
+            self.deadline.pause();
+            return Poll::Ready(Ok(()));
         };
-        self.pause();
+        self.rate.pause();
+        if self.is_within && self.deadline.poll_late(cx).is_ready() {
+            return Poll::Ready(Err(MessageTooSlow));
+        }
         let wait = early.wait_time_from(DefaultClock::default().now());
         self.retry
             .as_mut()
@@ -196,6 +204,8 @@ impl<S> Fragments<S> {
             if !self.is_within {
                 self.deadline.reset();
             }
+            // Heads pay for no time.
+            self.deadline.moved(length);
             self.is_within = !is_last || frame.first & FINAL == 0;
         }
         // What follows goes on with the message.
@@ -238,7 +248,7 @@ impl<S: AsyncRead + Unpin> Fragments<S> {
             Poll::Ready(read) => {
                 read?;
                 self.rate.moved(buffer.filled().len());
-                self.deadline.moved(buffer.filled().len());
+                self.deadline.pause();
                 self.input.extend_from_slice(buffer.filled());
                 self.is_heard |= !buffer.filled().is_empty();
                 Poll::Ready(Ok(!buffer.filled().is_empty()))
@@ -302,7 +312,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for Fragments<S> {
                 return Poll::Ready(Ok(()));
             }
             if self.fragment_left == 0 {
-                ready!(self.poll_frame_rate(cx));
+                ready!(self.poll_frame_rate(cx)).map_err(io::Error::other)?;
                 ready!(poll_proceed(cx)).made_progress();
                 match self.begin_fragment() {
                     Ok(true) => continue,

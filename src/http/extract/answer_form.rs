@@ -34,11 +34,15 @@ impl AnswerForm {
     }
 }
 
+/// Most items of a list in a header that are looked at. Browsers send some five.
+pub const MAX_ITEMS: usize = 64;
+
 /// What a client takes, by a header that is a list: names in lower case, and their qualities (RFC 9110, section 12.4.2).
 pub fn qualities(headers: &HeaderMap, name: HeaderName) -> impl Iterator<Item = (String, f32)> {
     let values = headers.get_all(name).into_iter();
     let texts = values.filter_map(|value| value.to_str().ok());
-    texts.flat_map(|text| text.split(',')).map(|item| {
+    let items = texts.flat_map(|text| text.split(',')).take(MAX_ITEMS);
+    items.map(|item| {
         let mut parts = item.split(';').map(str::trim);
         let name = parts.next().unwrap_or_default().to_ascii_lowercase();
         let quality = parts.find_map(|part| part.strip_prefix("q=")?.trim().parse().ok());

@@ -11,6 +11,7 @@ use crate::http::problems::problem::Problem;
 use axum::body::{Body, Bytes, HttpBody};
 use axum::extract::multipart::{Field, MultipartError};
 use axum::extract::{FromRequest, Multipart, Request};
+use axum::http::header::CONTENT_TYPE;
 use bagtrack_api::requests::Settings;
 use bagtrack_sessions::Charge;
 use bytes::BytesMut;
@@ -19,6 +20,10 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::task::{Context, Poll};
+
+/// Most bytes of the content type. A boundary has at most 70 (RFC 2046, section 5.1.1), and what may be the beginning of
+/// one is looked through again whenever a piece comes.
+const MAX_TYPE_BYTES: usize = 256;
 
 /// Pieces of fewer bytes are gathered, as far as they have come.
 const ENOUGH_BYTES: usize = 8 << 10;
@@ -103,6 +108,11 @@ pub(super) async fn read<S: Settings>(
     fields: &mut Fields,
     charge: &mut Charge,
 ) -> Result<(), Problem> {
+    let media_type = request.headers().get(CONTENT_TYPE);
+    if media_type.is_some_and(|media_type| media_type.len() > MAX_TYPE_BYTES) {
+        let detail = "The content type is too long. A `boundary` has at most 70 characters.";
+        return Err(Problem::malformed(detail));
+    }
     let progress = Arc::new(Progress::default());
     let request = request.map(|body| {
         let progress = progress.clone();

@@ -24,6 +24,15 @@ impl Texts {
     /// # Errors
     /// The query cannot be read, or a setting is unknown, doubled or no value of its type.
     pub fn of_query<S: Settings>(uri: &Uri) -> Result<Self, Problem> {
+        let pairs = uri
+            .query()
+            .unwrap_or_default()
+            .split('&')
+            .take(MAX_SETTINGS + 1);
+        if pairs.count() > MAX_SETTINGS {
+            let detail = format!("The query has more than {MAX_SETTINGS} settings.");
+            return Err(Problem::malformed(detail));
+        }
         let Query(pairs) = Query::<Vec<(String, String)>>::try_from_uri(uri)
             .map_err(|_| Problem::malformed("The query cannot be read; send name=value pairs."))?;
         let mut texts = Self::default();

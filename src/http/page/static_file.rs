@@ -3,7 +3,7 @@
 //! Each is compressed once, when it is first asked for, so that no request costs the processor time of another. A tag
 //! tells whether a browser has the file already. It is a weak one, since both encodings have it.
 
-use crate::http::extract::answer_form::qualities;
+use crate::http::extract::answer_form::{MAX_ITEMS, qualities};
 use axum::body::Bytes;
 use axum::http::header::{
     ACCEPT_ENCODING, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_SECURITY_POLICY, CONTENT_TYPE, ETAG,
@@ -74,8 +74,9 @@ impl StaticFile {
     fn is_known(&self, headers: &HeaderMap) -> bool {
         let values = headers.get_all(IF_NONE_MATCH).into_iter();
         let texts = values.filter_map(|value| value.to_str().ok());
-        let mut tags = texts.flat_map(|text| text.split(',')).map(str::trim);
-        tags.any(|tag| tag == "*" || tag.strip_prefix("W/").unwrap_or(tag) == self.tag)
+        let tags = texts.flat_map(|text| text.split(',')).take(MAX_ITEMS);
+        tags.map(str::trim)
+            .any(|tag| tag == "*" || tag.strip_prefix("W/").unwrap_or(tag) == self.tag)
     }
 
     /// The file with gzip, where that is smaller.

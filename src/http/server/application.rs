@@ -267,9 +267,9 @@ async fn accept(
         };
         let (permit, service) = match permit {
             Ok(permit) => (permit, service.clone()),
-            Err(_) => match probes.enter_free(peer.ip()) {
-                Some(permit) => (permit, probe_service.clone()),
-                None => {
+            Err(_) => match probes.enter(peer.ip(), false) {
+                Ok(permit) => (permit, probe_service.clone()),
+                Err(_) => {
                     refuse(stream, peer, state, service.has_tls());
                     continue;
                 }

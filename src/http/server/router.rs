@@ -22,8 +22,9 @@ use axum::http::header::CONNECTION;
 #[cfg(feature = "tls")]
 use axum::http::{Method, header::HOST};
 use axum::middleware;
+use axum::response::Response;
 #[cfg(feature = "tls")]
-use axum::response::{IntoResponse, Redirect, Response};
+use axum::response::{IntoResponse, Redirect};
 use axum::routing::get;
 use tower_http::catch_panic::CatchPanicLayer;
 
@@ -38,12 +39,14 @@ pub fn router(state: AppState, extra: Router) -> Router {
     mount(&state.config.base_path, with_layers(routes, &state))
 }
 
-/// What is served to an address that has no connection left: probes, since a supervisor ends a service that does not answer
-/// them. Whoever asks for something else is told why, and loses the connection.
+/// What is served to an address that has no connection left: probes, since a supervisor ends a service that does not
+/// answer them. Whoever asks for something else is told why. Each connection has one answer, so nobody keeps the places.
 pub fn probes_only(state: &AppState) -> Router {
     let (probes, _) = routes::probes().split_for_parts();
-    let refuse = async || ([(CONNECTION, "close")], Problem::too_many_connections());
+    let refuse = async || Problem::too_many_connections();
     let routes = probes.with_state(state.clone()).fallback(refuse);
+    let close = async |response: Response| ([(CONNECTION, "close")], response);
+    let routes = routes.layer(middleware::map_response(close));
     mount(&state.config.base_path, with_layers(routes, state))
 }
 

@@ -186,3 +186,25 @@ async fn readiness_ends_before_the_service_does() {
     expect_problem(refused, "not-ready").await;
     assert!(!app.snapshot(&id).await.is_empty());
 }
+
+#[tokio::test]
+async fn nobody_keeps_the_places_for_probes() {
+    let app = TestApplication::start_with(|config| config.limits.client_connections = Some(1));
+    let app = app.await;
+    let id = app.open().await;
+    let target = format!("/sessions/{id}/frames");
+    let _busy = RawConnection::hold(app.address, "POST", &target, 1_000).await;
+    // Silent ones make room, and one that was answered is closed.
+    let mut silent = Vec::new();
+    for _ in 0..20 {
+        silent.push(RawConnection::open(app.address).await);
+    }
+    for _ in 0..20 {
+        let mut probe = RawConnection::open(app.address).await;
+        probe
+            .send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            .await;
+        let answer = within(probe.read_to_end(), "it is closed").await;
+        assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+    }
+}

@@ -1,11 +1,13 @@
 //! A fault of multer, and that forms are read without it. See docs/upstream/multer.md.
 
+use crate::application::{TestApplication, expect_problem};
 use crate::helpers::raw::RawConnection;
 use crate::program::Program;
 use axum::body::Bytes;
 use bagtrack_testing::cpu_time;
 use futures_util::FutureExt;
 use multer::Multipart;
+use reqwest::Method;
 use std::convert::Infallible;
 use std::task::Poll;
 
@@ -81,4 +83,20 @@ async fn a_form_in_pieces_of_four_bytes_takes_time_in_proportion_to_its_size() {
     println!("{short:.2} and {long:.2} s");
     // Eight times the bytes; 64 times as much where each piece is looked through with all before it.
     assert!(long < 20.0 * short.max(0.05), "{short} s and {long} s");
+}
+
+#[tokio::test]
+async fn a_form_whose_boundary_is_longer_than_one_may_be_is_refused() {
+    let app = TestApplication::start().await;
+    let part = "Content-Disposition: form-data; name=\"box\"\r\n\r\n1,1,9,9\r\n";
+    for (length, slug) in [(70, "missing-frame"), (1_000, "malformed-request")] {
+        let boundary = "b".repeat(length);
+        let request = app.request(Method::POST, "/sessions", &[]);
+        let request = request.header(
+            "content-type",
+            format!("multipart/form-data; boundary={boundary}"),
+        );
+        let form = format!("--{boundary}\r\n{part}--{boundary}--\r\n");
+        expect_problem(request.body(form).send().await.unwrap(), slug).await;
+    }
 }

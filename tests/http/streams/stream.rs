@@ -441,3 +441,27 @@ async fn a_message_has_the_time_of_a_body_however_fast_its_bytes_come() {
     assert_eq!(problem["type"], "/docs/problems#body-timeout", "{problem}");
     assert_eq!(client.close_code().await, 4408);
 }
+
+#[tokio::test]
+async fn a_message_of_empty_frames_without_end_is_too_slow() {
+    let app = TestApplication::start_with(|config| config.body_timeout = Duration::from_secs(1));
+    let app = app.await;
+    let id = app.open().await;
+    let mut client = StreamClient::open(app.address, &id, "").await;
+    // It begins with a byte, and is never the last one. More frames come than a client may send: it was held back, and
+    // its message had all the time of the world.
+    client.send_raw(&[0x02, 0x81, 0, 0, 0, 0, 7]).await;
+    let problem = loop {
+        client
+            .send_raw(&[0x00, 0x80, 0, 0, 0, 0].repeat(2_000))
+            .await;
+        tokio::select! {
+            // Where both are there on a busy machine, the stream has ended: nothing more can be sent.
+            biased;
+            problem = client.message() => break problem,
+            () = tokio::time::sleep(Duration::from_millis(100)) => {}
+        }
+    };
+    assert_eq!(problem["type"], "/docs/problems#body-timeout", "{problem}");
+    assert_eq!(client.close_code().await, 4408);
+}

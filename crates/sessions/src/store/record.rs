@@ -15,7 +15,7 @@ const MAX_GENERATION: u64 = i64::MAX as u64 - 1;
 /// The last second of the year 9999, in seconds since 1970. Later moments cannot be told.
 const LAST_MOMENT: u64 = 253_402_300_799;
 /// No session lives longer without a frame: a hundred years, so that its end can be told.
-const MAX_TTL: Duration = Duration::from_secs(100 * 366 * 24 * 3600);
+pub(super) const MAX_TTL: Duration = Duration::from_secs(100 * 366 * 24 * 3600);
 
 /// Names a session. The id alone may be another session's later.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -1,6 +1,6 @@
 //! A store in Redis or Valkey: each call is one script.
 
-use super::super::record::{Record, SessionName, Version};
+use super::super::record::{MAX_TTL, Record, SessionName, Version};
 use super::super::session_store::{
     Commit, Counted, Outcome, SessionStore, StoreFuture, StoreShare, StoreUnavailable, milliseconds,
 };
@@ -82,7 +82,7 @@ impl FromRedisValue for Outcome {
             4 => Ok(Self::Full),
             kind => {
                 let ttl = i64::from_redis_value(next()?)?;
-                let ttl = Duration::from_millis(u64::try_from(ttl).unwrap_or(0));
+                let ttl = Duration::from_millis(u64::try_from(ttl).unwrap_or(0)).min(MAX_TTL);
                 if kind == 1 {
                     return Ok(Self::Committed(ttl));
                 }
