@@ -82,8 +82,8 @@ pub enum ReplayError {
 }
 
 /// The answers to a request with the frames `posted`, which the client numbers from `number` on, where they were given
-/// before; none where it holds the next frame. `recent` are the answers to the last frames, at least one. `given` is the
-/// box, where the request corrects it.
+/// before; none where it holds the next frame. `recent` are the answers to the last frames, at least one. `given` is
+/// the box, where the request corrects it.
 ///
 /// A request is a replay if the answers to all its frames are stored, and their bytes (and the box) are the same. One
 /// without a number never is.

@@ -66,8 +66,8 @@ impl SessionState {
         bytes
     }
 
-    /// The session that a snapshot holds, with the last `max_recent` of its stored answers. One with a second opinion is
-    /// that of `expert`, which is the one of this process.
+    /// The session that a snapshot holds, with the last `max_recent` of its stored answers. One with a second opinion
+    /// is that of `expert`, which is the one of this process.
     ///
     /// # Errors
     /// See [`SnapshotError`].

@@ -114,12 +114,12 @@ impl SessionState {
     }
 
     /// Tracks through a frame with this digest, in which the user may correct a target, which there must be. Between
-    /// targets `meter` says whether to go on. The answer is to be [stored](Self::store). `seen` becomes what the trackers
-    /// saw.
+    /// targets `meter` says whether to go on. The answer is to be [stored](Self::store). `seen` becomes what the
+    /// trackers saw.
     ///
     /// # Errors
-    /// The tracker refused the frame or the box, or the work was stopped. Some targets may have taken the frame then, so
-    /// callers work on a copy.
+    /// The tracker refused the frame or the box, or the work was stopped. Some targets may have taken the frame then,
+    /// so callers work on a copy.
     pub(super) fn step(
         &mut self,
         frame: Frame,

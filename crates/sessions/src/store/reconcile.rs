@@ -45,7 +45,8 @@ pub enum Step {
     Unavailable(StoreUnavailable),
 }
 
-/// Reads the outcome of a call to the store, for a request that wants this of a copy of the session of this incarnation.
+/// Reads the outcome of a call to the store, for a request that wants this of a copy of the session of this
+/// incarnation.
 pub fn reconcile(
     incarnation: u64,
     intent: Intent,

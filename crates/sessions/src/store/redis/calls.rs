@@ -96,8 +96,8 @@ impl FromRedisValue for Outcome {
 }
 
 impl RedisStore {
-    /// The store at this address. The keys of its records begin with `prefix`. Calls end after `timeout`; what it counts of
-    /// clients is as old as `clock` says. It waits for the first answer, and goes on without one.
+    /// The store at this address. The keys of its records begin with `prefix`. Calls end after `timeout`; what it
+    /// counts of clients is as old as `clock` says. It waits for the first answer, and goes on without one.
     ///
     /// # Errors
     /// The address cannot be used.
