@@ -362,6 +362,49 @@ async fn a_folder_that_cannot_be_written_is_tried_again_and_nothing_answered_is_
     session.advance(&store).await;
 }
 
+/// What a process that is killed while it makes the store leaves, step by step.
+#[tokio::test]
+async fn a_first_start_that_was_broken_off_is_begun_anew() {
+    for step in ["lock", "keyspaces/", "0.jnl", "version", "keyspaces/0/"] {
+        let folder = tempfile::tempdir().unwrap();
+        for made in ["lock", "keyspaces/", "0.jnl", "version", "keyspaces/0/"] {
+            let path = folder.path().join(made);
+            match made.ends_with('/') {
+                true => fs::create_dir_all(path).unwrap(),
+                false => fs::write(path, []).unwrap(),
+            }
+            if made == step {
+                break;
+            }
+        }
+        let store = open(folder.path(), DURABILITIES[0]);
+        let store = store.unwrap_or_else(|error| panic!("{step}: {error}"));
+        Known::create(&store, 1, TTL).await;
+        drop(store);
+        open(folder.path(), DURABILITIES[0]).unwrap();
+    }
+}
+
+#[tokio::test]
+async fn a_store_whose_journal_is_gone_or_empty_is_refused() {
+    for is_removed in [true, false] {
+        let folder = tempfile::tempdir().unwrap();
+        filled(folder.path(), 2, 3).await;
+        for file in files(folder.path()) {
+            match file.extension().is_some_and(|extension| extension == "jnl") {
+                true if is_removed => fs::remove_file(file).unwrap(),
+                true => fs::write(file, []).unwrap(),
+                false => {}
+            }
+        }
+        let refused = open(folder.path(), DURABILITIES[0])
+            .unwrap_err()
+            .to_string();
+        assert!(refused.contains("the journal is gone"), "{refused}");
+        assert!(refused.contains("put a copy"), "{refused}");
+    }
+}
+
 #[tokio::test]
 async fn damaged_files_are_refused_or_repaired_and_nothing_is_made_up() {
     let folder = tempfile::tempdir().unwrap();

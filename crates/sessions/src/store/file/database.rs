@@ -6,7 +6,7 @@ use fjall::{
     Keyspace, KeyspaceCreateOptions, PersistMode, Readable, SingleWriterTxDatabase,
     SingleWriterTxKeyspace, SingleWriterWriteTx,
 };
-use std::fs::{DirBuilder, File};
+use std::fs::{self, DirBuilder, File};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -23,14 +23,17 @@ const CACHE_BYTES: u64 = 8 << 20;
 const JOURNAL_BYTES: u64 = 64 << 20;
 /// Space is given back when as many bytes of states were dropped.
 const COMPACTED_BYTES: u64 = 8 << 20;
-/// Of a disk's bytes, one of so many has to be free for a further session, and at most [`MAX_RESERVE`] of them: the frames
-/// of the sessions that are there need it, and the tables when they are rewritten.
+/// Of a disk's bytes, one of so many has to be free for a further session, and at most [`MAX_RESERVE`] of them: the
+/// frames of the sessions that are there need it, and the tables when they are rewritten.
 const RESERVE: u64 = 10;
 const MAX_RESERVE: u64 = 1 << 30;
 /// Most rows, and most marks of ended sessions, that are dropped in one transaction.
 const SWEPT_ROWS: usize = 1024;
 /// Of an entry without a state in memory, with what the map has beside it.
 pub(super) const ENTRY_BYTES: u64 = 128;
+
+/// The folder of the tables.
+const TABLES: &str = "keyspaces";
 
 /// Why a database cannot be used that was removed, or is on a disk that is not there.
 pub(super) const GONE: &str = "the store's files are not there any more";
@@ -93,14 +96,20 @@ impl OpenError {
     }
 }
 
-/// Whether an error is of the system, and not of what a file holds, of one that is missing, or of one that is so short that
-/// the database reads from before its beginning.
+/// Whether an error is of the system, and not of what a file holds, of one that is missing or should not be there, or
+/// of one that is so short that the database reads from before its beginning.
 fn is_of_system(error: &io::Error) -> bool {
-    let is_of_file = matches!(
-        error.kind(),
-        io::ErrorKind::NotFound | io::ErrorKind::InvalidInput
-    );
-    error.raw_os_error().is_some() && !is_of_file
+    use io::ErrorKind as Kind;
+    match error.kind() {
+        Kind::NotFound | Kind::AlreadyExists | Kind::InvalidInput => false,
+        // Where a temporary file is written, these come without the system's number.
+        Kind::StorageFull
+        | Kind::QuotaExceeded
+        | Kind::FileTooLarge
+        | Kind::ReadOnlyFilesystem
+        | Kind::PermissionDenied => true,
+        _ => error.raw_os_error().is_some(),
+    }
 }
 
 /// What the database has, each by its key.
@@ -151,9 +160,14 @@ impl Database {
     /// # Errors
     /// See [`OpenError`].
     pub(super) fn open(folder: &Path) -> Result<Self, OpenError> {
-        let written = make_folder(folder)
-            .and_then(|()| journals(folder))
-            .map_err(|source| OpenError::io(folder, source))?;
+        let io = |source| OpenError::io(folder, source);
+        make_folder(folder).map_err(io)?;
+        let written = journals(folder).map_err(io)?;
+        if has_tables(folder).map_err(io)? {
+            check_journals(folder, &written)?;
+        } else if written.iter().all(|(_, length)| *length == 0) {
+            clear_unfinished(folder).map_err(io)?;
+        }
         // Damaged files may break an assumption of the database.
         let opened = catch_unwind(AssertUnwindSafe(|| Self::open_unguarded(folder)));
         let opened = opened.map_err(|_| OpenError::Damaged {
@@ -176,8 +190,8 @@ impl Database {
         Ok(database)
     }
 
-    /// Opens the database of a folder that has one. A folder without is that of a disk which is not there: the sessions are
-    /// on the disk, and would be told to be lost.
+    /// Opens the database of a folder that has one. A folder without is that of a disk which is not there: the sessions
+    /// are on the disk, and would be told to be lost.
     ///
     /// # Errors
     /// See [`OpenError`].
@@ -422,6 +436,51 @@ fn make_folder(folder: &Path) -> io::Result<()> {
         builder.mode(0o700);
     }
     builder.create(folder)
+}
+
+/// Whether there are tables of sessions: the database's own is the first one.
+fn has_tables(folder: &Path) -> io::Result<bool> {
+    match folder.join(TABLES).read_dir() {
+        Ok(entries) => {
+            let names: io::Result<Vec<_>> = entries.map(|entry| Ok(entry?.file_name())).collect();
+            Ok(names?.iter().any(|name| name != "0"))
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+/// Refuses tables whose journals are gone, or were emptied: the database would go on without the sessions in them. A
+/// journal is as long as it may get from its beginning.
+fn check_journals(folder: &Path, journals: &[(PathBuf, u64)]) -> Result<(), OpenError> {
+    let is_there = |(path, _): &(PathBuf, u64)| path.metadata().is_ok_and(|file| file.len() > 0);
+    match journals.iter().any(is_there) {
+        true => Ok(()),
+        false => Err(OpenError::Damaged {
+            folder: folder.to_owned(),
+            reason: "the journal is gone".to_owned(),
+        }),
+    }
+}
+
+/// Takes away what a first start has left that was broken off, where no other process is at it: the database opens no
+/// folder that is not finished.
+fn clear_unfinished(folder: &Path) -> io::Result<()> {
+    let Ok(lock) = File::options().write(true).open(folder.join("lock")) else {
+        return Ok(());
+    };
+    if lock.try_lock().is_err() {
+        return Ok(());
+    }
+    for journal in journal_paths(folder)? {
+        fs::remove_file(journal)?;
+    }
+    let missing_is_fine = |removed: io::Result<()>| match removed {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    };
+    missing_is_fine(fs::remove_dir_all(folder.join(TABLES)))?;
+    missing_is_fine(fs::remove_file(folder.join("version")))
 }
 
 /// The journals in a folder, and how long each is without the zeros at its end.
