@@ -1,9 +1,9 @@
 //! The open connections: how many there are, whose they are, and which one makes room for a new one.
 //!
-//! A client is an IPv4 address or an IPv6 network of 64 bits. It has at most its maximum, and at most as many as are free
-//! or idle (a dynamic threshold, as in [`Budget`](bagtrack_sessions::Budget)): so a few clients with busy connections
-//! leave some to each further one. The wider IPv6 networks that a client is in may hold as many as one client, and
-//! beyond that as many as are free or idle.
+//! A client is an IPv4 address or an IPv6 network of 64 bits. It has at most its maximum, and at most as many as are
+//! free or idle (a dynamic threshold, as in [`Budget`](bagtrack_sessions::Budget)): so a few clients with busy
+//! connections leave some to each further one. The wider IPv6 networks that a client is in may hold as many as one
+//! client, and beyond that as many as are free or idle.
 //!
 //! Whoever may have no more loses the one of its own that was idle longest. When all are taken, it is one of the client
 //! that has most. A connection with a request in progress is never closed for another one.

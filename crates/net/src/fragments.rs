@@ -1,11 +1,11 @@
 //! The bytes of a WebSocket connection, with the client's messages in small fragments, and their memory charged.
 //!
-//! The library makes room for a whole frame when its head has come (docs/upstream/tungstenite.md), and keeps that room for
-//! the next one: a few bytes, or one large message, would hold memory for the life of a stream. So it gets each frame in
-//! fragments (RFC 6455, section 5.4). Its own buffer holds one of them, and a message is put together as it arrives. A
-//! fragment is handed over when its memory is charged. Where there is none the client waits: nothing more is read from it. So does a client whose
-//! streams send more frames a second than it may: the smallest ones cost next to no bytes. Each fragment counts as work of
-//! its task, which gives others their turn after some of them.
+//! The library makes room for a whole frame when its head has come (docs/upstream/tungstenite.md), and keeps that room
+//! for the next one: a few bytes, or one large message, would hold memory for the life of a stream. So it gets each
+//! frame in fragments (RFC 6455, section 5.4). Its own buffer holds one of them, and a message is put together as it
+//! arrives. A fragment is handed over when its memory is charged. Where there is none the client waits: nothing more is
+//! read from it. So does a client whose streams send more frames a second than it may: the smallest ones cost next to
+//! no bytes. Each fragment counts as work of its task, which gives others their turn after some of them.
 
 use crate::LeastRate;
 use arrayvec::ArrayVec;
@@ -34,6 +34,8 @@ const COPIES: usize = 2;
 /// How long to wait before memory is asked for again.
 const RETRY: Duration = Duration::from_millis(20);
 
+/// What a frame takes of the time of its message: empty ones would never end it where the service is the slower one.
+const FRAME_TIME: Duration = Duration::from_micros(100);
 /// A timer that is asked for less would cost more than the frames that it lets pass.
 const LEAST_WAIT: Duration = Duration::from_millis(5);
 
@@ -149,8 +151,8 @@ impl<S> Fragments<S> {
             return Poll::Ready(Ok(()));
         }
         let Err(early) = self.messages.check() else {
-            self.deadline.pause();
-            return Poll::Ready(Ok(()));
+            let has_time = self.deadline.spend(FRAME_TIME) || !self.is_within;
+            return Poll::Ready(has_time.then_some(()).ok_or(MessageTooSlow));
         };
         self.rate.pause();
         if self.is_within && self.deadline.poll_late(cx).is_ready() {

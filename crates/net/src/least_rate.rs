@@ -1,7 +1,8 @@
 //! The least rate at which a client has to send or to take bytes.
 //!
-//! Only the time counts in which the service waits for the client. The client may use up a fixed time of it; bytes that go
-//! over pay some of it back, and where that is allowed some in advance. So a client that now and then moves a byte does not hold its connection for long.
+//! Only the time counts in which the service waits for the client. The client may use up a fixed time of it; bytes that
+//! go over pay some of it back, and where that is allowed some in advance. So a client that now and then moves a byte
+//! does not hold its connection for long.
 
 use bagtrack_sessions::clock::{self, Instant, Sleep, sleep_until};
 use std::pin::Pin;
@@ -60,6 +61,13 @@ impl LeastRate {
         if let Some(since) = self.since.take() {
             self.left = self.left.saturating_sub(since.elapsed());
         }
+    }
+
+    /// The client has used up so much of its time by what it sent. Tells whether any is left.
+    pub fn spend(&mut self, time: Duration) -> bool {
+        self.pause();
+        self.left = self.left.saturating_sub(time);
+        !self.left.is_zero()
     }
 
     /// Waits for the client; ready when it is too slow.
