@@ -1,8 +1,8 @@
 //! The HTTP service bagtrack: it follows an object through the frames that clients upload. The first frame and a box
 //! open a session; every further frame gets a box back.
 //!
-//! The tracker is the crate [`bagtrack_tracker`], which implements the paper *Bags of Affine Subspaces for Robust Object
-//! Tracking*. This crate is the service around it, and the program `bagtrack`.
+//! The tracker is the crate [`bagtrack_tracker`], which implements the paper *Bags of Affine Subspaces for Robust
+//! Object Tracking*. This crate is the service around it, and the program `bagtrack`.
 //!
 //! | module | holds |
 //! |---|---|

@@ -1,12 +1,13 @@
 //! Attacks on the service: `cargo build --release && cargo run --release --example attack -- --short`.
 //!
 //! Here are the attacks that need the program itself: its memory, and what good clients notice that send 25 frames a
-//! second. The others are tests of `tests/http`. Each attack runs against a server of its own. It gets through when a good
-//! client loses a frame, when the service answers what it should refuse, or when it takes more memory than it said at its
-//! start. Then this program ends with status 1.
+//! second. The others are tests of `tests/http`. Each attack runs against a server of its own. It gets through when a
+//! good client loses a frame, when the service answers what it should refuse, or when it takes more memory than it said
+//! at its start. Then this program ends with status 1.
 //!
 //! The server believes `X-Forwarded-For` from this machine, so that attackers and good clients have addresses of their
-//! own. `--url` attacks a server that runs already; give it `--trusted-proxies 127.0.0.0/8`. Its memory is not measured.
+//! own. `--url` attacks a server that runs already; give it `--trusted-proxies 127.0.0.0/8`. Its memory is not
+//! measured.
 //!
 //! Linux only: memory is read from `/proc`.
 

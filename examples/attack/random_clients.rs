@@ -1,12 +1,12 @@
 //! Random clients beside four good ones. Each does all that a client may do, flat out, in an order that its seed gives:
 //! posts, batches, streams, videos, creations, half bodies, answers that nobody reads, junk.
 //!
-//! This is a property and no list: whatever the seed, the good clients lose no frame, are never refused and hardly wait,
-//! the service stays alive and within its memory, and gives back all that was held. A seed for which it fails becomes an
-//! attack of its own.
+//! This is a property and no list: whatever the seed, the good clients lose no frame, are never refused and hardly
+//! wait, the service stays alive and within its memory, and gives back all that was held. A seed for which it fails
+//! becomes an attack of its own.
 //!
-//! The attackers are a process of their own at the lowest priority. They would be on other machines: here they take only
-//! what the service and the good clients leave, which still keeps every worker busy.
+//! The attackers are a process of their own at the lowest priority. They would be on other machines: here they take
+//! only what the service and the good clients leave, which still keeps every worker busy.
 
 use crate::costly_sessions::QUERY;
 use crate::decode_bombs::form;
@@ -36,8 +36,8 @@ const GOOD: u8 = 4;
 const MAX_P50: f64 = 3.0;
 const MAX_P99: f64 = 5.0;
 /// In a short run a handful of answers decides: there nobody notices what takes less, in milliseconds, or waits for one
-/// work that nobody knew to be slow, which takes as long as so many frames. And `/healthz` is compared with how slow the
-/// machine makes it anyway. A long run has none of this.
+/// work that nobody knew to be slow, which takes as long as so many frames. And `/healthz` is compared with how slow
+/// the machine makes it anyway. A long run has none of this.
 const SHORT_P50: f64 = 10.0;
 const SHORT_P99: f64 = 100.0;
 const SHORT_P99_FRAMES: f64 = 30.0;
@@ -56,8 +56,8 @@ const HELD: [&str; 7] = [
     "bagtrack_streams",
 ];
 
-/// How often a good client sends, so that it asks for no more than its share of the workers beside the random ones. On a
-/// slow machine, or in a build without optimisation, 25 frames a second would be more, and rightly be refused.
+/// How often a good client sends, so that it asks for no more than its share of the workers beside the random ones. On
+/// a slow machine, or in a build without optimisation, 25 frames a second would be more, and rightly be refused.
 async fn fair_period(target: &Target) -> Outcome<Duration> {
     let clients = GoodClients::start(target, GOOD).await?;
     sleep(Duration::from_secs(3)).await;

@@ -66,12 +66,12 @@ struct Options {
     /// Print the resident memory of the server with 1000, 2000, 5000 … of these sessions, and nothing else.
     #[arg(long)]
     memory: bool,
-    /// Seconds for which sessions come and go at `--rate`; then compare the resident memory with that after ten minutes,
-    /// and do nothing else.
+    /// Seconds for which sessions come and go at `--rate`; then compare the resident memory with that after ten
+    /// minutes, and do nothing else.
     #[arg(long)]
     churn: Option<u64>,
-    /// So many times the frames that `--sessions` sessions get through, from cameras of ten frames a second, for `--seconds`
-    /// each; and nothing else.
+    /// So many times the frames that `--sessions` sessions get through, from cameras of ten frames a second, for
+    /// `--seconds` each; and nothing else.
     #[arg(long, value_delimiter = ',')]
     overload: Vec<f64>,
     /// The server's binary; otherwise `bagtrack` beside this program's folder.

@@ -1,8 +1,8 @@
 //! More frames than the server gets done: what becomes of those that it answers, and of the others?
 //!
 //! Cameras of ten frames a second, a tenth of a session's frames each, at clients of a network of their own. A camera
-//! sends its newest frame, without a number, and goes on after a refusal: it does not wait as `Retry-After` asks. Where the
-//! answer is late it skips the frames that were due meanwhile.
+//! sends its newest frame, without a number, and goes on after a refusal: it does not wait as `Retry-After` asks. Where
+//! the answer is late it skips the frames that were due meanwhile.
 
 use std::time::Duration;
 
@@ -50,8 +50,8 @@ impl Answers {
     }
 }
 
-/// Prints how many of `frames` frames that many sessions get through in a second, and what becomes of so many `times` as
-/// many, for so long each.
+/// Prints how many of `frames` frames that many sessions get through in a second, and what becomes of so many `times`
+/// as many, for so long each.
 pub async fn run(
     driver: &Driver,
     (sessions, frames, length): (u32, u32, Duration),
@@ -69,7 +69,8 @@ pub async fn run(
     Ok(())
 }
 
-/// Sends `times` the frames that the server gets through in a second, `knee`, for so long, and prints what became of them.
+/// Sends `times` the frames that the server gets through in a second, `knee`, for so long, and prints what became of
+/// them.
 async fn send(driver: &Driver, knee: f64, times: f64, length: Duration) -> Outcome<()> {
     let cameras = (times * knee / RATE).ceil() as u32;
     let mut opened = Vec::new();

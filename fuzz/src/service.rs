@@ -98,8 +98,8 @@ impl Service {
         self.runtime.block_on(what)
     }
 
-    /// Sends a request whose body arrives in pieces of `piece` bytes. Every answer is success, or a problem document: of
-    /// the client's doing, or about what a store has.
+    /// Sends a request whose body arrives in pieces of `piece` bytes. Every answer is success, or a problem document:
+    /// of the client's doing, or about what a store has.
     pub fn send_in_pieces(
         &self,
         (method, path): (Method, &str),

@@ -26,7 +26,8 @@ pub fn extract_seed(value: &Bound<'_, PyAny>) -> PyResult<Option<u64>> {
     }
 }
 
-/// The parameters of `preset` with single ones set otherwise. Where the seed is None, one is drawn from Python's `random`.
+/// The parameters of `preset` with single ones set otherwise. Where the seed is None, one is drawn from Python's
+/// `random`.
 ///
 /// # Errors
 /// There is no such preset or parameter, or a value is of the wrong type or out of its range.

@@ -15,8 +15,8 @@
 //! store does not have, every session goes on until its caller ends it or it expires, and nothing is held in the end.
 //!
 //! The same seed does the same again, since one thread runs all tasks in order; the time is tokio's, paused; and all
-//! random numbers are drawn from the seed, those of the service by `bagtrack_sessions::random`. Work takes simulated time
-//! only: what the scheduler does with measured times is left to its own tests.
+//! random numbers are drawn from the seed, those of the service by `bagtrack_sessions::random`. Work takes simulated
+//! time only: what the scheduler does with measured times is left to its own tests.
 
 mod caller;
 mod chance;

@@ -46,8 +46,8 @@ impl Wire {
         Some(caller)
     }
 
-    /// Carries bytes one way, in order, until their end or until the line breaks. What is on its way when the sender has
-    /// gone still arrives.
+    /// Carries bytes one way, in order, until their end or until the line breaks. What is on its way when the sender
+    /// has gone still arrives.
     async fn convey(
         self,
         mut from: impl AsyncRead + Unpin,

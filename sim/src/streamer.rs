@@ -239,8 +239,8 @@ impl Account {
         self.others.iter_mut().for_each(|sent| sent.push(frame));
     }
 
-    /// As many of the frames without an answer were tracked, and have these answers. Two pictures may have the same one,
-    /// so several choices may have them. Whether there is any.
+    /// As many of the frames without an answer were tracked, and have these answers. Two pictures may have the same
+    /// one, so several choices may have them. Whether there is any.
     fn take(&mut self, answers: &[String]) -> bool {
         let unanswered = std::mem::take(&mut self.unanswered);
         let others = std::mem::take(&mut self.others);

@@ -1,5 +1,5 @@
-//! TLS to a service whose certificate is not checked: for the health check, which asks at this machine's own address and
-//! sends nothing that is secret.
+//! TLS to a service whose certificate is not checked: for the health check, which asks at this machine's own address
+//! and sends nothing that is secret.
 
 use rustls::client::danger::{HandshakeSignatureValid, ServerCertVerified, ServerCertVerifier};
 use rustls::crypto::{CryptoProvider, ring, verify_tls12_signature, verify_tls13_signature};

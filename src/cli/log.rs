@@ -115,7 +115,8 @@ impl DroppedLines {
     }
 }
 
-/// Libraries that log each attempt to reach what is away, hundreds a second. The service says when it goes and comes back.
+/// Libraries that log each attempt to reach what is away, hundreds a second. The service says when it goes and comes
+/// back.
 const QUIET: &str = "redis=off";
 
 /// The filter of this text. A word alone must be a level: a mistyped one would be a module that logs nothing, and all

@@ -1,8 +1,8 @@
 //! The commands of the program, one file each.
 //!
-//! In: flags and environment variables, read by clap. Out: standard output, new files, and an exit status: 0; 1 after an
-//! error, which is one line on standard error; 2 from clap on wrong usage; 128 and the number of the signal that ended
-//! `track`.
+//! In: flags and environment variables, read by clap. Out: standard output, new files, and an exit status: 0; 1 after
+//! an error, which is one line on standard error; 2 from clap on wrong usage; 128 and the number of the signal that
+//! ended `track`.
 
 mod address;
 #[cfg(feature = "tls")]

@@ -38,7 +38,8 @@ async fn haproxy_sends_a_replica_that_is_about_to_end_the_frames_of_its_sessions
     let own = own.expect("a replica has the session");
     own.ask_to_end();
     while own.readiness().await == StatusCode::OK {}
-    // HAProxy has found out when the others take so many sessions one after the other. Until then the replica refuses some.
+    // HAProxy has found out when the others take so many sessions one after the other. Until then the replica refuses
+    // some.
     const ALL: usize = 16;
     let (asked, mut number, mut opened) = (Instant::now(), 0, 0);
     while opened < ALL {

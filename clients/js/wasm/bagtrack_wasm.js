@@ -206,8 +206,8 @@ export class Frame {
         wasm.__wbg_frame_free(ptr, 0);
     }
     /**
-     * A frame of planes, as JPEG has them (Rec. 601, full range): `width` x `height` values of luma and, where there is
-     * colour, Cb and Cr in half of the columns and rows, rounded up.
+     * A frame of planes, as JPEG has them (Rec. 601, full range): `width` x `height` values of luma and, where there
+     * is colour, Cb and Cr in half of the columns and rows, rounded up.
      *
      * # Errors
      * A side of 0, or a plane of another size.
@@ -242,7 +242,8 @@ export class Frame {
         return Frame.__wrap(ret[0]);
     }
     /**
-     * A frame of `width` x `height` RGBA pixels row by row, as in `ImageData`. What is transparent is blended over black.
+     * A frame of `width` x `height` RGBA pixels row by row, as in `ImageData`. What is transparent is blended over
+     * black.
      *
      * # Errors
      * A side of 0, or a number of bytes that is not `4 * width * height`.
@@ -443,8 +444,8 @@ export class Tracker {
         wasm.__wbg_tracker_free(ptr, 0);
     }
     /**
-     * What the tracker keeps of the target: for each entry of the bag, oldest first, the gray values of its mean and of
-     * the columns of its basis, each row by row.
+     * What the tracker keeps of the target: for each entry of the bag, oldest first, the gray values of its mean and
+     * of the columns of its basis, each row by row.
      * @returns {Entry[]}
      */
     get bag() {

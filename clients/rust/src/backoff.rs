@@ -39,8 +39,8 @@ impl Backoff {
     }
 }
 
-/// The pauses between the recoveries of one call. The first recovery comes at once; where every replica loses the session
-/// again, they end with the time for retries.
+/// The pauses between the recoveries of one call. The first recovery comes at once; where every replica loses the
+/// session again, they end with the time for retries.
 pub struct RecoveryBackoff {
     backoff: Backoff,
     has_recovered: bool,

@@ -120,8 +120,8 @@ impl ClientBuilder {
         self
     }
 
-    /// The longest time for one request (15 s); a millisecond more for 50 bytes of its frames, which take long over a slow
-    /// line.
+    /// The longest time for one request (15 s); a millisecond more for 50 bytes of its frames, which take long over a
+    /// slow line.
     pub fn timeout(mut self, timeout: Duration) -> Self {
         self.timeout = timeout;
         self
@@ -135,8 +135,8 @@ impl ClientBuilder {
     }
 
     /// After so many frames a session takes a snapshot (30; more than 128 count as 128), and keeps the frames after it.
-    /// Zero: never, so that a session ends with the service, unless that drains first. A service with a store needs none,
-    /// and none are taken.
+    /// Zero: never, so that a session ends with the service, unless that drains first. A service with a store needs
+    /// none, and none are taken.
     pub fn snapshot_every(mut self, frames: u32) -> Self {
         self.snapshot_every = frames;
         self

@@ -32,10 +32,10 @@
 //! | any other refusal | [`ClientError::Refused`]; the session is as it was |
 //! | no good answer for `retry_for` | [`ClientError::Unavailable`] or [`ClientError::Transport`] |
 //!
-//! `docs/PROTOCOL.md` has the details, which are those of the Python and the JavaScript client. So the boxes are the same
-//! as if nothing had happened. A snapshot is taken every [`ClientBuilder::snapshot_every`] frames, and the frames since
-//! then are kept. A service with a store says what it has (`Checkpoint`), and no snapshots are taken
-//! then. Without a store, replicas and restarts need common snapshot keys.
+//! `docs/PROTOCOL.md` has the details, which are those of the Python and the JavaScript client. So the boxes are the
+//! same as if nothing had happened. A snapshot is taken every [`ClientBuilder::snapshot_every`] frames, and the frames
+//! since then are kept. A service with a store says what it has (`Checkpoint`), and no snapshots are taken then.
+//! Without a store, replicas and restarts need common snapshot keys.
 //!
 //! A frame without an answer, because of the last row or because the call was dropped, is kept: the next call sends it
 //! before its own frame. Do not send it again.

@@ -248,8 +248,8 @@ impl Transport {
     }
 }
 
-/// Whether another try would not mend it: what is no request, a certificate that is refused, and HTTPS without a feature
-/// of reqwest for it. The last two are told in words alone.
+/// Whether another try would not mend it: what is no request, a certificate that is refused, and HTTPS without a
+/// feature of reqwest for it. The last two are told in words alone.
 fn is_final(error: &reqwest::Error) -> bool {
     let is_told =
         |text: &String| text.contains("certificate") || text.contains("scheme is not http");

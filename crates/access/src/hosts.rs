@@ -1,7 +1,7 @@
 //! Which hosts requests may name.
 //!
-//! A page can make its own host name resolve to this machine. To the browser it is of the same origin then, and may call
-//! whatever listens there. What it cannot do is name another host.
+//! A page can make its own host name resolve to this machine. To the browser it is of the same origin then, and may
+//! call whatever listens there. What it cannot do is name another host.
 
 use bagtrack_config::Config;
 use std::net::IpAddr;
@@ -18,8 +18,8 @@ pub enum AllowedHosts<'a> {
 }
 
 impl<'a> AllowedHosts<'a> {
-    /// Those of the settings. A service that only this machine can reach, that needs no key, and that no proxy is said to
-    /// be before, is for this machine.
+    /// Those of the settings. A service that only this machine can reach, that needs no key, and that no proxy is said
+    /// to be before, is for this machine.
     pub fn of(config: &'a Config, needs_key: bool) -> Self {
         let hosts = &config.access.allowed_hosts;
         let is_local = config.listen.ip().is_loopback() && config.limits.trusted_proxies.is_empty();

@@ -9,8 +9,8 @@
 //! make a session token: it is good for one session and a limited time, and nothing about it is stored.
 //!
 //! What can go wrong: a key is guessed by timing (digests are compared in constant time), or leaks by the log (it is
-//! never logged, and [`Secret`](bagtrack_config::Secret) does not show itself); a file of keys is broken when it is read
-//! again (the keys before stay); the service is open to a network by accident (it does not start then: see
+//! never logged, and [`Secret`](bagtrack_config::Secret) does not show itself); a file of keys is broken when it is
+//! read again (the keys before stay); the service is open to a network by accident (it does not start then: see
 //! [`AccessError`]); a web page elsewhere uses the browser of somebody inside (its host is checked here, and its origin
 //! by the service).
 

@@ -1,8 +1,9 @@
 //! Session tokens: what a web page gets in place of an API key.
 //!
-//! A token holds the id of its session and the random number that this was opened with, the moment at which it ends, the
-//! name of the key that made it, and a code of all of these and of that key under a secret of the service. So nothing is
-//! stored, and it ends with its session (another one may have the id later), its time, its key or the secret.
+//! A token holds the id of its session and the random number that this was opened with, the moment at which it ends,
+//! the name of the key that made it, and a code of all of these and of that key under a secret of the service. So
+//! nothing is stored, and it ends with its session (another one may have the id later), its time, its key or the
+//! secret.
 //!
 //! Layout, as base64url after [`PREFIX`]: 16 bytes of id, 8 of the incarnation, 8 of seconds since 1970 (both big
 //! endian), 32 of code, and the name.

@@ -9,8 +9,8 @@ use std::time::Duration;
 #[error("{} ({status})", if detail.is_empty() { title } else { detail })]
 #[cfg_attr(feature = "service", derive(utoipa::ToSchema), schema(as = Problem))]
 pub struct ProblemDocument {
-    /// Names the kind of problem, and opens as a page with its causes and cure. Relative to the service; what follows `#`
-    /// never changes.
+    /// Names the kind of problem, and opens as a page with its causes and cure. Relative to the service; what follows
+    /// `#` never changes.
     #[serde(default, rename = "type")]
     #[cfg_attr(
         feature = "service",

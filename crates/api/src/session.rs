@@ -35,8 +35,8 @@ pub struct CreatedSession {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "service", schema(value_type = Parameters, nullable = false, required = false))]
     pub parameters: Option<Parameters>,
-    /// When the session ends if no frame comes (RFC 3339). Every frame moves this on, and `GET` tells it then: a repeated
-    /// creation gets the answer of the first.
+    /// When the session ends if no frame comes (RFC 3339). Every frame moves this on, and `GET` tells it then: a
+    /// repeated creation gets the answer of the first.
     #[cfg_attr(feature = "service", schema(format = DateTime, example = "2026-01-31T12:00:00Z"))]
     pub expires_at: String,
 }

@@ -11,8 +11,8 @@ use bagtrack_tracker::{Expert, InDoubt};
 /// The flag that gives a network.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct ModelFlag {
-    /// A network that gives a second opinion of every frame, as KIND:FILE,FILE. The one kind is `nanotrack`, with the ONNX
-    /// files of its backbone and its head. docs/laboratory/ACCURACY.md says where they are and what they bring.
+    /// A network that gives a second opinion of every frame, as KIND:FILE,FILE. The one kind is `nanotrack`, with the
+    /// ONNX files of its backbone and its head. docs/laboratory/ACCURACY.md says where they are and what they bring.
     #[arg(long, value_name = "nanotrack:BACKBONE,HEAD")]
     model: Option<ModelFiles>,
     /// Asks the network only of frames of which the filter is not sure: with a score below 0.95.

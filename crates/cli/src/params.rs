@@ -1,7 +1,7 @@
 //! Tracker parameters from the command line.
 //!
-//! `--set` takes every field of [`Params`], so that measurements can switch off what a preset owns; `--help` lists those
-//! of the table.
+//! `--set` takes every field of [`Params`], so that measurements can switch off what a preset owns; `--help` lists
+//! those of the table.
 
 use crate::assignment::{AssignError, Assignment, assign, parse_assignment};
 use bagtrack_tracker::{Parameter, Params, Preset};

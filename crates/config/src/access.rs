@@ -16,12 +16,12 @@ settings! {
         api_keys_file: Option<PathBuf> = None;
         /// Serve everybody who can reach the address. Without API keys only this machine is served otherwise.
         no_auth: bool = false;
-        /// Hosts that requests may name, like `example.org` or `example.org:8443`, separated by commas [default: all; the
-        /// names and addresses of this machine for a service on a loopback address without API keys and trusted proxies].
-        /// `/healthz`, `/readyz` and `/metrics` answer under any.
+        /// Hosts that requests may name, like `example.org` or `example.org:8443`, separated by commas [default: all;
+        /// the names and addresses of this machine for a service on a loopback address without API keys and trusted
+        /// proxies]. `/healthz`, `/readyz` and `/metrics` answer under any.
         allowed_hosts: Vec<String> = Vec::new(), |values| hosts(values);
-        /// Secrets of at least 16 characters that snapshots and session tokens are signed with, separated by commas: the
-        /// first signs, all are accepted. Without one, those of other processes are refused.
+        /// Secrets of at least 16 characters that snapshots and session tokens are signed with, separated by commas:
+        /// the first signs, all are accepted. Without one, those of other processes are refused.
         snapshot_keys: Vec<Secret> = Vec::new(), as "SECRET";
         /// Key that alone reads `/metrics`, at least 16 characters [default: every API key does].
         metrics_key: Option<Secret> = None, as "KEY";

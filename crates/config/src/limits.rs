@@ -30,8 +30,8 @@ settings! {
         body_grace: Duration = Duration::from_secs(5), moment;
         /// Least bytes a second at which a client takes answers, after `write-timeout` of waiting for it.
         min_answer_rate: u32 = 4096, positive;
-        /// A connection is closed when its client was waited for this long while it took no byte of an answer, or took them
-        /// more slowly than `min-answer-rate`.
+        /// A connection is closed when its client was waited for this long while it took no byte of an answer, or took
+        /// them more slowly than `min-answer-rate`.
         write_timeout: Duration = Duration::from_secs(30), moment;
         /// Time for the answer to a client that has closed its side of the connection; then it counts as gone.
         half_close_timeout: Duration = Duration::from_secs(5), moment;
@@ -51,8 +51,8 @@ settings! {
         client_frame_rate: u32 = 0;
 
         # "Sessions"
-        /// Most bytes that the states of all sessions take together; larger parameters take more of it [default: 512 KiB
-        /// for each of `max-sessions`].
+        /// Most bytes that the states of all sessions take together; larger parameters take more of it [default: 512
+        /// KiB for each of `max-sessions`].
         max_session_bytes: Option<usize> = None, positive_share;
 
         # "Listening"

@@ -61,8 +61,8 @@ impl MemoryBound {
         let thread = WORKER + WORKING_IMAGE + count(MAX_LIST_BYTES);
         Self {
             uploads: count(config.max_upload_bytes),
-            // There are quick and slow workers. Of the work on several frames some more may wait between two of them, with
-            // what its thread keeps. Each has a frame and a copy of its session's targets.
+            // There are quick and slow workers. Of the work on several frames some more may wait between two of them,
+            // with what its thread keeps. Each has a frame and a copy of its session's targets.
             work: (workers.saturating_mul(2).saturating_mul(frame))
                 .saturating_add(threads.saturating_mul(thread)),
             sessions: count(config.session_bytes()),

@@ -29,9 +29,9 @@ settings! {
         workers: Option<usize> = None, |workers| workers.as_ref().map_or(Ok(()), permits);
         /// Requests with a frame that are inside at the same time, the ones at work included.
         queue: usize = 256, permits;
-        /// When the oldest frame of a client has waited longer for a worker all the time, for half a second, its newest go
-        /// first, and older ones that have waited twice as long are refused. Frames of streams and posts of several wait.
-        /// 0s: none is refused.
+        /// When the oldest frame of a client has waited longer for a worker all the time, for half a second, its newest
+        /// go first, and older ones that have waited twice as long are refused. Frames of streams and posts of several
+        /// wait. 0s: none is refused.
         queue_delay: Duration = Duration::from_millis(75), delay;
         /// Requests at one session at the same time, the one at work included.
         session_queue: usize = 8, permits;
@@ -45,17 +45,18 @@ settings! {
         session_idle: Duration = Duration::from_secs(600), moment;
         /// A new session expires when its first frame does not come for this long.
         session_first: Duration = Duration::from_secs(60), moment;
-        /// A network that gives a second opinion of every frame of a session: the ONNX files of its backbone and its head.
-        /// Sessions that were opened with one go on with the same one alone.
+        /// A network that gives a second opinion of every frame of a session: the ONNX files of its backbone and its
+        /// head. Sessions that were opened with one go on with the same one alone.
         model: Option<ModelFiles> = None, as "nanotrack:BACKBONE,HEAD";
-        /// The network is asked only of frames of which the filter is not sure: with a score below 0.95. All replicas must
-        /// have the same.
+        /// The network is asked only of frames of which the filter is not sure: with a score below 0.95. All replicas
+        /// must have the same.
         model_in_doubt: bool = false;
 
         # "Uploads"
         /// Most bytes of a request body.
         max_body_bytes: usize = 32 << 20, positive;
-        /// Most bytes of all bodies together: of what has come of requests, and of large answers that are not taken yet.
+        /// Most bytes of all bodies together: of what has come of requests, and of large answers that are not taken
+        /// yet.
         max_upload_bytes: usize = 512 << 20;
         /// Most frames of one post.
         max_frames: usize = 64, positive;
@@ -83,8 +84,8 @@ settings! {
         cors_origins: Vec<String> = Vec::new(), |values| origins(values);
 
         # "Shutdown"
-        /// On SIGTERM, /readyz answers 503 and no session can be opened for this long before connections are refused, so
-        /// that load balancers notice, and clients take their sessions elsewhere. SIGINT leaves it out.
+        /// On SIGTERM, /readyz answers 503 and no session can be opened for this long before connections are refused,
+        /// so that load balancers notice, and clients take their sessions elsewhere. SIGINT leaves it out.
         shutdown_delay: Duration = Duration::from_secs(5), delay;
         /// Time for open requests to end on shutdown.
         shutdown_timeout: Duration = Duration::from_secs(20), delay;

@@ -1,8 +1,8 @@
 //! Settings as rows of a table: the text, the name, the type, the default and the range of each stand in one place,
 //! below the heading that it has in the help.
 //!
-//! The macro [`settings`] makes of such a table the struct, its defaults, its flags with their environment variables, and
-//! the check of its ranges.
+//! The macro [`settings`] makes of such a table the struct, its defaults, its flags with their environment variables,
+//! and the check of its ranges.
 
 use super::base_path::BasePath;
 use super::flag_values::{parse_duration, parse_listen, parse_network};

@@ -11,15 +11,16 @@ settings! {
     /// Where sessions are kept. Without a store they live in this process only, and end with it.
     pub struct StoreConfig {
         # "Store"
-        /// Where sessions are stored: `file:DIR` for one process, which goes on from there after a restart. For replicas
-        /// `redis://[user:password@]host[:port][/database]`, `valkey` alike, or `redis-cluster://host:port,host:port`.
-        /// `rediss` and `valkeys` for TLS.
+        /// Where sessions are stored: `file:DIR` for one process, which goes on from there after a restart. For
+        /// replicas `redis://[user:password@]host[:port][/database]`, `valkey` alike, or
+        /// `redis-cluster://host:port,host:port`. `rediss` and `valkeys` for TLS.
         store: Option<Secret> = None, as "URL";
-        /// When a store in a folder is synced to the disk: at least once in this time, or before `each` answer. A process
-        /// that is killed loses nothing; a power cut may lose what was answered since the last sync.
+        /// When a store in a folder is synced to the disk: at least once in this time, or before `each` answer. A
+        /// process that is killed loses nothing; a power cut may lose what was answered since the last sync.
         durability: Durability = Durability::default();
-        /// Write a session's state at every so many frames. Answers say `Checkpoint: N`; after the end of a replica, its
-        /// clients send the frames after N again. More than 1 needs a load balancer that keeps a session at one replica.
+        /// Write a session's state at every so many frames. Answers say `Checkpoint: N`; after the end of a replica,
+        /// its clients send the frames after N again. More than 1 needs a load balancer that keeps a session at one
+        /// replica.
         store_every: u64 = 1, positive;
         /// Time for a call to the store.
         store_timeout: Duration = Duration::from_secs(1), moment;

@@ -63,8 +63,8 @@ fn samples(mp4: &Mp4, track: &Track, edit: &Edit) -> Result<Vec<Sample>, DemuxEr
     track.samples.iter().zip(shifts).map(sample).collect()
 }
 
-/// How much later each sample is decoded than the ones before it say: a fragment tells when it begins, and `re_mp4` reads
-/// that of the first one only.
+/// How much later each sample is decoded than the ones before it say: a fragment tells when it begins, and `re_mp4`
+/// reads that of the first one only.
 fn shifts(mp4: &Mp4, track: &Track) -> Vec<i64> {
     let fragments = mp4.moofs.iter().flat_map(|moof| &moof.trafs);
     let fragments = fragments.filter(|traf| traf.tfhd.track_id == track.track_id);

@@ -2,8 +2,9 @@
 //!
 //!     cargo run --release -p bagtrack-eval --example alone -- BACKBONE HEAD full|working DIR...
 //!
-//! `working` gives it the frames as a session has them, `full` as they are in the files. Prints for each sequence the mean
-//! overlap, the share of frames within 20 pixels, the milliseconds of a look, and with the variable BOXES set every box.
+//! `working` gives it the frames as a session has them, `full` as they are in the files. Prints for each sequence the
+//! mean overlap, the share of frames within 20 pixels, the milliseconds of a look, and with the variable BOXES set
+//! every box.
 
 use std::error::Error;
 use std::path::Path;

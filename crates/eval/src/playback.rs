@@ -1,9 +1,9 @@
 //! The way a run plays a sequence: from which frame on, in which direction, which frames, and from how exact a box.
 //!
 //! The same frames played backwards, or from the middle on, serve as further videos: the first image and the changes
-//! differ. Fewer frames a second are what a client with a slow line sends, and a box drawn by hand is not exact. What can
-//! go wrong: a run needs a box to start from. So it starts at the first annotated frame at or after the chosen one, and a
-//! sequence without such a frame is refused.
+//! differ. Fewer frames a second are what a client with a slow line sends, and a box drawn by hand is not exact. What
+//! can go wrong: a run needs a box to start from. So it starts at the first annotated frame at or after the chosen one,
+//! and a sequence without such a frame is refused.
 
 use bagtrack_tracker::Rect;
 use serde::Serialize;
@@ -24,8 +24,8 @@ pub struct Playback {
     pub first_box_error: Option<f64>,
 }
 
-/// The errors of the first box, in shares of its width and height: as in OTB's spatial robustness evaluation it is moved
-/// in eight directions, and made smaller and larger about its centre.
+/// The errors of the first box, in shares of its width and height: as in OTB's spatial robustness evaluation it is
+/// moved in eight directions, and made smaller and larger about its centre.
 const SHIFTS: [(f64, f64); 8] = [
     (1.0, 0.0),
     (-1.0, 0.0),

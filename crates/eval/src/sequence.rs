@@ -78,8 +78,8 @@ impl Sequence {
         self.boxes[0].map(|annotated| self.playback.first_box(annotated, seed))
     }
 
-    /// The frames as the service decodes them for a session with `params` that starts with the box `first`; decoded once
-    /// for sessions with the same format that follow each other.
+    /// The frames as the service decodes them for a session with `params` that starts with the box `first`; decoded
+    /// once for sessions with the same format that follow each other.
     ///
     /// # Errors
     /// A frame that is unreadable.

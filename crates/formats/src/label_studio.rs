@@ -1,6 +1,6 @@
-//! Label Studio's JSON: a task with a `videorectangle` for each target, for a labelling with `<VideoRectangle name="box"
-//! toName="video"/>`. Frames count from 1, boxes are in percent. After a key frame that is not enabled the region is not
-//! shown.
+//! Label Studio's JSON: a task with a `videorectangle` for each target, for a labelling with `<VideoRectangle
+//! name="box" toName="video"/>`. Frames count from 1, boxes are in percent. After a key frame that is not enabled the
+//! region is not shown.
 
 use super::clip::Clip;
 use super::row::Row;

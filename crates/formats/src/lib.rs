@@ -1,10 +1,10 @@
 //! Tracked boxes as the files that other tools read: one file of this crate a format.
 //!
-//! In: a [`Row`] for each target in each frame, and the [`Clip`] that they are of. Out: a line for each row, a document,
-//! or the texts of a folder. `text`, `json` and `csv` have 0-based pixels, as the service does, with the score and the
-//! status; the others are what the tools read that they are named after. `bagtrack track` writes them, and the service
-//! answers them (`POST /track?format=…`). The page saves the same (`web/save.js`), and `tools/exports.sh` lets the tools'
-//! own readers read all three.
+//! In: a [`Row`] for each target in each frame, and the [`Clip`] that they are of. Out: a line for each row, a
+//! document, or the texts of a folder. `text`, `json` and `csv` have 0-based pixels, as the service does, with the
+//! score and the status; the others are what the tools read that they are named after. `bagtrack track` writes them,
+//! and the service answers them (`POST /track?format=…`). The page saves the same (`web/save.js`), and
+//! `tools/exports.sh` lets the tools' own readers read all three.
 
 mod clip;
 mod coco;

@@ -7,8 +7,8 @@ use super::clip::{Clip, image_name};
 use super::row::Row;
 use std::path::Path;
 
-/// Without `path` the folder of the file is meant, wherever it lies. Ultralytics does not train without `val`; were it the
-/// same frames, readers of annotations would have each box twice.
+/// Without `path` the folder of the file is meant, wherever it lies. Ultralytics does not train without `val`; were it
+/// the same frames, readers of annotations would have each box twice.
 const BEGINNING: &str =
     "train: images/train\n# To train, add other frames to validate with: val: images/val\nnames:\n";
 

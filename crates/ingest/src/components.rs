@@ -13,8 +13,8 @@ pub(super) type Channels<'memory> = (Channel<'memory>, Option<[Channel<'memory>;
 /// The reductions that cost less than none, the strongest first. The one to a half is not vectorised.
 const REDUCTIONS: [u32; 2] = [8, 4];
 
-/// The channels of a file with one scan, in the smallest size that is not smaller than that of `format`. `memory` is that
-/// of an earlier file.
+/// The channels of a file with one scan, in the smallest size that is not smaller than that of `format`. `memory` is
+/// that of an earlier file.
 pub(super) fn decode<'memory>(
     file: &[u8],
     markers: &Markers,

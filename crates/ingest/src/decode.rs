@@ -70,8 +70,8 @@ impl Inspected<'_> {
 
     /// Decodes it in the format that a session wants. A frame that is smaller than that stays as it is.
     ///
-    /// Allocates at most [`Limits::max_memory`] bytes beside the upload itself and the frame. A thread keeps some of them
-    /// for its next frame, at most 32 MiB.
+    /// Allocates at most [`Limits::max_memory`] bytes beside the upload itself and the frame. A thread keeps some of
+    /// them for its next frame, at most 32 MiB.
     ///
     /// # Errors
     /// See [`IngestError`].
@@ -116,7 +116,8 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Frame, IngestError> {
     })
 }
 
-/// Decodes one uploaded frame as [`Inspected::decode`] does. `format` says the format from the upload's width and height.
+/// Decodes one uploaded frame as [`Inspected::decode`] does. `format` says the format from the upload's width and
+/// height.
 ///
 /// # Errors
 /// See [`IngestError`].

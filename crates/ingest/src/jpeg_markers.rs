@@ -153,10 +153,10 @@ impl Markers {
     }
 
     /// Copies the image to `guarded`, with one-bits before its end marker. After the end marker the decoder reads
-    /// zero-bits without end, and makes gray blocks of them (docs/upstream/zune-jpeg.md). A run of one-bits is a code that
-    /// no Huffman table has (T.81, annex C), so where blocks are missing the decoder must report an error. A whole image
-    /// is decoded before it gets there. The exception are images whose channels come one after the other with restarts:
-    /// there the decoder reads past the end of the last channel.
+    /// zero-bits without end, and makes gray blocks of them (docs/upstream/zune-jpeg.md). A run of one-bits is a code
+    /// that no Huffman table has (T.81, annex C), so where blocks are missing the decoder must report an error. A whole
+    /// image is decoded before it gets there. The exception are images whose channels come one after the other with
+    /// restarts: there the decoder reads past the end of the last channel.
     pub(super) fn with_guarded_end(&self, bytes: &[u8], guarded: &mut Vec<u8>) {
         let guard_bytes = if self.is_progressive() || self.scans == 1 {
             GUARD_BYTES

@@ -18,8 +18,8 @@
 //!
 //! [`inspect`] does that once; what it returns knows the size, and decodes without reading the structure again.
 //!
-//! zune-jpeg reads the headers of every JPEG and decides what is damaged. rusty_jpeg decodes those with one scan, as the
-//! components that are stored, and reduces large ones as it does; with the feature `turbo`, libjpeg-turbo is asked
+//! zune-jpeg reads the headers of every JPEG and decides what is damaged. rusty_jpeg decodes those with one scan, as
+//! the components that are stored, and reduces large ones as it does; with the feature `turbo`, libjpeg-turbo is asked
 //! first. Both are fast paths: on any error or warning, and for any file that they do not take, zune-jpeg decides.
 //!
 //! ```

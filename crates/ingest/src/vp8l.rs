@@ -5,9 +5,9 @@
 //! last code: the small images before the pixels are walked through, and no pixel is kept.
 //!
 //! Nothing simpler bounds it. image-webp 0.2.4 allocates every group up to the largest number that stands in the small
-//! image of groups, whether a pixel uses it or not, so the number of pixels is no bound; its `set_memory_limit` is asked
-//! for metadata only (docs/upstream/image-webp.md). A bound by pixels that holds would be that of 65,536 groups, whatever
-//! the image.
+//! image of groups, whether a pixel uses it or not, so the number of pixels is no bound; its `set_memory_limit` is
+//! asked for metadata only (docs/upstream/image-webp.md). A bound by pixels that holds would be that of 65,536 groups,
+//! whatever the image.
 
 use super::prefix_codes::{Bits, Code};
 
@@ -19,8 +19,8 @@ const FIRST_LENGTH: u16 = 256;
 const FIRST_SEEN_COLOR: u16 = FIRST_LENGTH + 24;
 const SIGNATURE: usize = 0x2f;
 
-/// Bytes that the codes of the image in a `VP8L` chunk take: exactly, or more than `most`. None, where they cannot be read,
-/// or the image has another size: its own one is up to the sender, and so is the time to walk through it.
+/// Bytes that the codes of the image in a `VP8L` chunk take: exactly, or more than `most`. None, where they cannot be
+/// read, or the image has another size: its own one is up to the sender, and so is the time to walk through it.
 pub(super) fn memory_of_codes(data: &[u8], size: (usize, usize), most: u64) -> Option<u64> {
     let mut bits = Bits::new(data);
     if bits.number(8)? != SIGNATURE {
@@ -116,8 +116,8 @@ fn read_group(bits: &mut Bits, seen_colors: usize) -> Option<[Code; 5]> {
     ])
 }
 
-/// Reads an image with one group of codes. Returns the largest number in the red and green of its pixels: what is copied
-/// was there before.
+/// Reads an image with one group of codes. Returns the largest number in the red and green of its pixels: what is
+/// copied was there before.
 fn read_pixels(bits: &mut Bits, width: usize, height: usize) -> Option<usize> {
     let seen_colors = read_seen_colors(bits)?;
     let codes = read_group(bits, seen_colors)?;

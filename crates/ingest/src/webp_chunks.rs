@@ -1,8 +1,8 @@
-//! The chunk structure of WebP, read before decoding: whether the file is whole, and what decoding it takes. The decoder
-//! would not notice a missing end, or would allocate as many bytes as a chunk claims.
+//! The chunk structure of WebP, read before decoding: whether the file is whole, and what decoding it takes. The
+//! decoder would not notice a missing end, or would allocate as many bytes as a chunk claims.
 //!
-//! What counts is what image-webp 0.2.4 decodes: of a simple file its first chunk; of an extended one the first chunk of
-//! each kind, or the first frame of its animation. Each image has to have the size that the file says elsewhere: the
+//! What counts is what image-webp 0.2.4 decodes: of a simple file its first chunk; of an extended one the first chunk
+//! of each kind, or the first frame of its animation. Each image has to have the size that the file says elsewhere: the
 //! decoder compares them too, but not before it has decoded.
 
 use super::png_chunks::CUT_SHORT;
@@ -97,8 +97,8 @@ impl<'a> Images<'a> {
         place.get_or_insert(data);
     }
 
-    /// Those of an `ANMF` chunk: its first one, or after an alpha channel the next, whatever its name. Where the file is
-    /// no animation, the decoder takes them for chunks of the file, of which none was there before.
+    /// Those of an `ANMF` chunk: its first one, or after an alpha channel the next, whatever its name. Where the file
+    /// is no animation, the decoder takes them for chunks of the file, of which none was there before.
     fn of_frame(data: &'a [u8], is_animation: bool) -> Self {
         let side = |at: usize| {
             let [low, middle, high] = *data.get(at..)?.first_chunk()?;

@@ -1,7 +1,7 @@
 //! What one client has in use, against its quotas.
 //!
-//! Quotas are shares of what the service has: sessions and their bytes, requests in flight, bytes of uploads, and frames
-//! and requests a second.
+//! Quotas are shares of what the service has: sessions and their bytes, requests in flight, bytes of uploads, and
+//! frames and requests a second.
 
 use super::client::Client;
 use super::holdings::Holdings;
@@ -162,8 +162,8 @@ impl Account {
         )
     }
 
-    /// How many frames the client may send a second and at once, and how many it may send now; `None` where they are not
-    /// counted.
+    /// How many frames the client may send a second and at once, and how many it may send now; `None` where they are
+    /// not counted.
     pub fn frames(&self) -> Option<(Rate, u32)> {
         let counting = self.counting_frames();
         Some((counting.quotas.frames?, counting.frames.as_ref()?.left()))

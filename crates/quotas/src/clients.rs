@@ -25,7 +25,8 @@ pub struct Clients {
 }
 
 impl Clients {
-    /// No client yet, with the quotas of this configuration. Where there is a store, memory is only a cache of sessions.
+    /// No client yet, with the quotas of this configuration. Where there is a store, memory is only a cache of
+    /// sessions.
     pub fn new(config: &Config, has_store: bool) -> Self {
         let limits = &config.limits;
         let quarter = |share: Option<usize>, whole: usize| share.unwrap_or(whole.div_ceil(4));

@@ -12,12 +12,12 @@ use std::time::Duration;
 /// A rate: how many a second, and how many at once.
 pub type Rate = (NonZeroU32, NonZeroU32);
 
-/// Frames of WebSockets, which carry messages: as many as some hundred cameras send, and so few that they take a network
-/// thread little time, whatever is in them.
+/// Frames of WebSockets, which carry messages: as many as some hundred cameras send, and so few that they take a
+/// network thread little time, whatever is in them.
 pub const MESSAGES: Rate = rate(10_000, 2_000);
-/// Requests that take no turn at the workers: more than pages of some people and their programs ask for, and so few that
-/// they take a network thread some percent of its time. At once the 70 files of the page, for a dozen people behind one
-/// address.
+/// Requests that take no turn at the workers: more than pages of some people and their programs ask for, and so few
+/// that they take a network thread some percent of its time. At once the 70 files of the page, for a dozen people
+/// behind one address.
 pub const ASKED: Rate = rate(500, 1_000);
 /// TLS handshakes: the service signs in each, for which a network thread takes milliseconds with a large key of RSA. At
 /// once the cameras and pages of some dozen people behind one address.

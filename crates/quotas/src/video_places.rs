@@ -44,8 +44,8 @@ impl VideoPlaces {
         place.ok()?.ok()
     }
 
-    /// Ready when it is `from` or later, and somebody waits for a place whom no other one is promised. The place has to be
-    /// given up then.
+    /// Ready when it is `from` or later, and somebody waits for a place whom no other one is promised. The place has to
+    /// be given up then.
     pub async fn wanted_from(&self, from: Instant) {
         sleep_until(from).await;
         let mut waiting = self.waiting.subscribe();

@@ -11,8 +11,8 @@ pub struct Attributes {
     pub fast_motion: f64,
     /// Share of the time between two frames for which the shutter is open, 0 to 1.
     pub motion_blur: f64,
-    /// How far the camera shakes, in shorter sides of the frame, 0 to 0.25: each frame has another offset, chosen by the
-    /// seed, up to so much in each direction.
+    /// How far the camera shakes, in shorter sides of the frame, 0 to 0.25: each frame has another offset, chosen by
+    /// the seed, up to so much in each direction.
     pub camera_motion: f64,
     /// Factor on both sides of the card that is reached in the last frame, 0.1 to 10.
     pub scale_variation: f64,

@@ -1,10 +1,10 @@
 //! Synthetic clips with exact ground truth: a textured card moves in front of a textured wall.
 //!
-//! In: [`Settings`], which are the [`Scene`], the number and size of the frames, a seed, and [`Attributes`] that make the
-//! clip hard: a small, fast, blurred, growing or turning card, a shaken camera, cards that look alike. In the default scene the
-//! card moves in smooth turns, comes nearer, passes through a dim spell and is half covered for a while. In the others
-//! it goes out of sight and comes back. Patches with a pattern like the card's hang on the wall, and every pixel has
-//! sensor noise.
+//! In: [`Settings`], which are the [`Scene`], the number and size of the frames, a seed, and [`Attributes`] that make
+//! the clip hard: a small, fast, blurred, growing or turning card, a shaken camera, cards that look alike. In the
+//! default scene the card moves in smooth turns, comes nearer, passes through a dim spell and is half covered for a
+//! while. In the others it goes out of sight and comes back. Patches with a pattern like the card's hang on the wall,
+//! and every pixel has sensor noise.
 //!
 //! Out: a [`Clip`], which draws each frame and tells where the card is and how much of it is visible. It can be written
 //! as a folder in the OTB layout, as JPEG or PNG ([`Format`]). The same settings draw the same clip, bit for bit, on

@@ -1,7 +1,7 @@
 //! The one place that asks for the time, and through which everything waits.
 //!
-//! Moments, sleeping and time-outs are tokio's, whose time a test pauses and moves (`start_paused`). Sessions expire by a
-//! [`Clock`], which moves forward for itself: so a test of the whole service need not wait either.
+//! Moments, sleeping and time-outs are tokio's, whose time a test pauses and moves (`start_paused`). Sessions expire by
+//! a [`Clock`], which moves forward for itself: so a test of the whole service need not wait either.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

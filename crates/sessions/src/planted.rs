@@ -1,4 +1,5 @@
-//! Faults that a simulation must find. They are in builds with the feature `planted-faults` only, and there one at a time.
+//! Faults that a simulation must find. They are in builds with the feature `planted-faults` only, and there one at a
+//! time.
 
 /// A fault of the code. Some are in the scripts of a Redis alone.
 #[cfg_attr(not(feature = "redis"), allow(dead_code))]

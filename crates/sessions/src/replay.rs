@@ -1,8 +1,8 @@
 //! Frame numbers: which request holds the next frame, and which is an old one that was sent again.
 //!
 //! A client whose connection broke does not know whether its frame was taken. If it numbers its frames it can send the
-//! request again: the same bytes under the same number get the stored answer. The answers to the last requests are kept,
-//! so a request with several frames can be repeated too, and one after which others were answered.
+//! request again: the same bytes under the same number get the stored answer. The answers to the last requests are
+//! kept, so a request with several frames can be repeated too, and one after which others were answered.
 
 use super::per_target::PerTarget;
 use super::planted::PlantedFault;

@@ -7,8 +7,8 @@
 //! before the code is checked. A service may accept unsigned ones, so all in them is bounded and checked nevertheless:
 //! of the stored answers only so many are kept as a session stores at most, and the tracker validates its own part.
 //!
-//! A tracker's own snapshot is a session too: that of a tracker in a page or a program, which has no key. It is accepted
-//! where unsigned ones are.
+//! A tracker's own snapshot is a session too: that of a tracker in a page or a program, which has no key. It is
+//! accepted where unsigned ones are.
 
 use super::compression;
 use super::mac::{MAC_BYTES, MacKeys};

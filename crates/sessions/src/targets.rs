@@ -84,7 +84,8 @@ pub fn largest_format(formats: impl Iterator<Item = FrameFormat>) -> FrameFormat
 }
 
 impl Targets {
-    /// A tracker for each box in `frame`, with `expert` beside it where there is one. Before each of them `check` says whether to go on.
+    /// A tracker for each box in `frame`, with `expert` beside it where there is one. Before each of them `check` says
+    /// whether to go on.
     ///
     /// # Errors
     /// See [`StartError`].

@@ -202,7 +202,8 @@ pub fn shipped(
     shipped
 }
 
-/// The greatest differences between the shipped evaluation and the textbook's: of distances, of likelihoods, of weights.
+/// The greatest differences between the shipped evaluation and the textbook's: of distances, of likelihoods, of
+/// weights.
 pub fn differences(
     candidates: &[Vec<f32>],
     history: &[&[f32]],

@@ -1,6 +1,6 @@
-//! A network with the inputs and outputs of NanoTrack that needs no training, as ONNX files: the backbone describes each
-//! 16 x 16 pixels by their mean colour, the head finds where the middle of the target's description fits best. The box keeps
-//! its size.
+//! A network with the inputs and outputs of NanoTrack that needs no training, as ONNX files: the backbone describes
+//! each 16 x 16 pixels by their mean colour, the head finds where the middle of the target's description fits best. The
+//! box keeps its size.
 
 use std::path::Path;
 use std::{fs, io};
@@ -45,8 +45,8 @@ pub fn backbone() -> Vec<u8> {
         .file(&["picture"], &["described"])
 }
 
-/// The ONNX file of the head: for each place -|x - t|²/2 over 2 x 2 cells, plus 3, as the logit of the target, and edges as
-/// far away as those of a box that fills the middle of the target's picture.
+/// The ONNX file of the head: for each place -|x - t|²/2 over 2 x 2 cells, plus 3, as the logit of the target, and
+/// edges as far away as those of a box that fills the middle of the target's picture.
 pub fn head() -> Vec<u8> {
     Graph::default()
         .integers("starts", &[3, 3])

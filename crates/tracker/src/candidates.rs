@@ -198,7 +198,8 @@ impl Candidates {
         &self.distances[index * self.entries()..][..self.entries()]
     }
 
-    /// The distance of particle `index` to the first entry of the bag, which is that of the first box where it is pinned.
+    /// The distance of particle `index` to the first entry of the bag, which is that of the first box where it is
+    /// pinned.
     pub fn first_distance_of(&self, index: usize) -> f64 {
         self.distances_of(index)[0]
     }

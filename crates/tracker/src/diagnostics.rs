@@ -11,8 +11,8 @@ pub struct Diagnostics {
     /// The particles that the answer was chosen from, in the order in which they were drawn: the box of each, in pixels
     /// of the uploaded frame, and its weight. Weights are at least 0 and sum to 1.
     pub particles: Vec<(Rect, f64)>,
-    /// For each entry of the bag, oldest first, its share of the likelihood of the best particle (equation 11): at least
-    /// 0, with the sum 1.
+    /// For each entry of the bag, oldest first, its share of the likelihood of the best particle (equation 11): at
+    /// least 0, with the sum 1.
     pub votes: Vec<f64>,
 }
 

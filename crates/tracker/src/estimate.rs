@@ -20,7 +20,8 @@ pub enum Status {
 }
 
 impl Status {
-    /// The status of an answer with this `score` that an expert had a part in; `lost` when the filter had lost the target.
+    /// The status of an answer with this `score` that an expert had a part in; `lost` when the filter had lost the
+    /// target.
     pub(crate) fn of_both(score: f32, lost: bool) -> Self {
         match (score >= UNCERTAIN_BELOW, lost) {
             (true, _) => Self::Tracking,

@@ -21,8 +21,8 @@ use crate::scale::dsst::ScaleFilter;
 
 /// By how much of its usual width the search widens in each frame in which the target is lost.
 const WIDENING: f64 = 0.5;
-/// Three standard deviations of the widest search, in sides √(width · height) of the target. A wider one costs more, and
-/// finds look-alikes.
+/// Three standard deviations of the widest search, in sides √(width · height) of the target. A wider one costs more,
+/// and finds look-alikes.
 const MAX_SEARCHED_SIDES: f64 = 5.0;
 
 /// The state of a tracker between two frames.
@@ -58,7 +58,8 @@ pub(crate) struct State {
 }
 
 impl State {
-    /// The bounds of particles around `target` in working images of this size, and the particle that is `target` itself.
+    /// The bounds of particles around `target` in working images of this size, and the particle that is `target`
+    /// itself.
     pub fn place(
         source: (u32, u32),
         (width, height): (u32, u32),

@@ -43,7 +43,8 @@ impl Tracker {
         Self::beside(frame, target, params, None)
     }
 
-    /// As [`new`](Self::new), with an expert beside the filter, which is asked in every frame. Without one this is `new`.
+    /// As [`new`](Self::new), with an expert beside the filter, which is asked in every frame. Without one this is
+    /// `new`.
     ///
     /// # Errors
     /// As for [`new`](Self::new); also an expert with parameters that take none ([`Params::takes_expert`]), as those of
@@ -194,11 +195,12 @@ impl Tracker {
         Self::restore_beside(snapshot, None)
     }
 
-    /// As [`restore`](Self::restore), with the expert that the session may have begun with. A session that began without
-    /// one goes on without.
+    /// As [`restore`](Self::restore), with the expert that the session may have begun with. A session that began
+    /// without one goes on without.
     ///
     /// # Errors
-    /// As for [`restore`](Self::restore); also a session that began with another expert, or with one where none is given.
+    /// As for [`restore`](Self::restore); also a session that began with another expert, or with one where none is
+    /// given.
     pub fn restore_beside(
         snapshot: &[u8],
         expert: Option<Arc<dyn Expert>>,

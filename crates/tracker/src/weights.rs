@@ -19,8 +19,8 @@ pub struct Likelihoods {
     entries: Vec<f64>,
 }
 
-/// Computes the likelihoods of `distances`, which hold for each particle its distance to each entry of the bag, and from
-/// them `weights`, one for each particle.
+/// Computes the likelihoods of `distances`, which hold for each particle its distance to each entry of the bag, and
+/// from them `weights`, one for each particle.
 ///
 /// A weight begins as an exponent, what is known of the particle besides (0: nothing), and becomes the exponential of
 /// that times the sum of the particle's likelihoods over the bag (equation 9), scaled so that all sum to 1. In the sum

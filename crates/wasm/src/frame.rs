@@ -10,7 +10,8 @@ pub struct WasmFrame(pub(crate) Frame);
 
 #[wasm_bindgen(js_class = Frame)]
 impl WasmFrame {
-    /// A frame of `width` x `height` RGBA pixels row by row, as in `ImageData`. What is transparent is blended over black.
+    /// A frame of `width` x `height` RGBA pixels row by row, as in `ImageData`. What is transparent is blended over
+    /// black.
     ///
     /// # Errors
     /// A side of 0, or a number of bytes that is not `4 * width * height`.
@@ -26,8 +27,8 @@ impl WasmFrame {
         made(Frame::from_rgbx(width, height, &blended))
     }
 
-    /// A frame of planes, as JPEG has them (Rec. 601, full range): `width` x `height` values of luma and, where there is
-    /// colour, Cb and Cr in half of the columns and rows, rounded up.
+    /// A frame of planes, as JPEG has them (Rec. 601, full range): `width` x `height` values of luma and, where there
+    /// is colour, Cb and Cr in half of the columns and rows, rounded up.
     ///
     /// # Errors
     /// A side of 0, or a plane of another size.

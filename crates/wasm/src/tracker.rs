@@ -84,8 +84,8 @@ impl WasmTracker {
         WasmParameters(self.0.params().clone())
     }
 
-    /// What the tracker keeps of the target: for each entry of the bag, oldest first, the gray values of its mean and of
-    /// the columns of its basis, each row by row.
+    /// What the tracker keeps of the target: for each entry of the bag, oldest first, the gray values of its mean and
+    /// of the columns of its basis, each row by row.
     #[wasm_bindgen(getter)]
     pub fn bag(&self) -> Vec<WasmEntry> {
         let entries = self.0.bag().into_iter();

@@ -1,5 +1,5 @@
-//! SIGINT (Ctrl-C), SIGTERM and SIGHUP (a terminal or a line that closes) while a command works: it ends after the frame
-//! at hand, and closes its files.
+//! SIGINT (Ctrl-C), SIGTERM and SIGHUP (a terminal or a line that closes) while a command works: it ends after the
+//! frame at hand, and closes its files.
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;

@@ -45,8 +45,8 @@ pub struct Args {
     /// groundtruth_rect.txt in DIR is taken (1-based there).
     #[arg(long = "box", value_name = "X,Y,W,H", value_parser = rect, allow_hyphen_values = true)]
     boxes: Vec<Rect>,
-    /// What a target is called, where the format says it: once for each box, in their order. Without it they are Object 1,
-    /// Object 2, …
+    /// What a target is called, where the format says it: once for each box, in their order. Without it they are Object
+    /// 1, Object 2, …
     #[arg(long = "name", value_name = "NAME", value_parser = target_name)]
     names: Vec<String>,
     /// The first frame: its number, counted from 0, or its time in a video, like 12.5s, 1:30 or 0:01:30. The boxes hold
@@ -62,8 +62,8 @@ pub struct Args {
     /// Ends when all targets are lost. A target's last row is the one in which it is lost.
     #[arg(long)]
     until_lost: bool,
-    /// Writes only key frames: between two of them straight lines give every edge of every box to within a pixel. Where a
-    /// target is lost, the run of lost frames has a key frame at each of its ends.
+    /// Writes only key frames: between two of them straight lines give every edge of every box to within a pixel. Where
+    /// a target is lost, the run of lost frames has a key frame at each of its ends.
     #[arg(long)]
     keyframes: bool,
     #[command(flatten)]
@@ -82,9 +82,9 @@ pub struct Args {
     output: Option<PathBuf>,
     /// Also writes every frame with its boxes: green tracking, orange uncertain, red lost. OUT is a new video (.mp4,
     /// .m4v, .mov, .mkv, .webm, .avi, .gif), for which ffmpeg must be installed; or a new folder of JPEG files, if it
-    /// has no ending, or a slash at its end. The frames of a video keep their times; in an .avi they last equally long, at
-    /// the rate that the source has on average, and a .gif has at most 50 of them a second. An odd side gets a black row
-    /// or column more: encoders want even ones.
+    /// has no ending, or a slash at its end. The frames of a video keep their times; in an .avi they last equally long,
+    /// at the rate that the source has on average, and a .gif has at most 50 of them a second. An odd side gets a black
+    /// row or column more: encoders want even ones.
     #[arg(long, value_name = "OUT")]
     draw: Option<PathBuf>,
 }

@@ -6,8 +6,8 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-/// Takes the rows. Lines are written at once, so that they are kept whatever ends the process; a document or a folder is
-/// written by `finish`.
+/// Takes the rows. Lines are written at once, so that they are kept whatever ends the process; a document or a folder
+/// is written by `finish`.
 pub struct Rows {
     sink: Sink,
     is_on_terminal: bool,

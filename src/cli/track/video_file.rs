@@ -1,5 +1,5 @@
-//! A video that is written frame by frame, by an installed ffmpeg. It gets JPEG pictures with their times as an IVF file:
-//! a header of 32 bytes, and before each picture its length and its time.
+//! A video that is written frame by frame, by an installed ffmpeg. It gets JPEG pictures with their times as an IVF
+//! file: a header of 32 bytes, and before each picture its length and its time.
 
 use super::video_info::{FFMPEG, Rate};
 use std::fs;

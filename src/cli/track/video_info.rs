@@ -11,7 +11,8 @@ pub const FFMPEG: &str = "ffmpeg";
 const FFPROBE: &str = "ffprobe";
 /// The first names of formats whose files have an index.
 const INDEXED: [&str; 2] = ["mov", "matroska"];
-/// Frames whose times are not further apart, in seconds, are shown at once, as in a recording that notes when they came.
+/// Frames whose times are not further apart, in seconds, are shown at once, as in a recording that notes when they
+/// came.
 const AT_ONCE: f64 = 1e-4;
 /// Encoders of MPEG-4 take no larger parts of a fraction.
 const MAX_PART: u32 = 65535;
@@ -103,8 +104,8 @@ impl VideoInfo {
         }
     }
 
-    /// Reads lines like `packet,512,K__` or `frame,512`, `stream,h264,25/1,1/12800` and `format,"mov,mp4",0.000000`. Gives the
-    /// times in the order of the lines, too: from whole ticks, since ffprobe cuts seconds to microseconds.
+    /// Reads lines like `packet,512,K__` or `frame,512`, `stream,h264,25/1,1/12800` and `format,"mov,mp4",0.000000`.
+    /// Gives the times in the order of the lines, too: from whole ticks, since ffprobe cuts seconds to microseconds.
     fn parse(told: &str) -> (Self, Vec<Option<f64>>) {
         let fields = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
         let mut ticks = Vec::new();
@@ -143,10 +144,10 @@ impl VideoInfo {
         (info, told_times)
     }
 
-    /// From which frame on the file is to be decoded for frame `index`, and within which seconds after its start time that
-    /// one is found: between the frames beside it, and nearer to itself, since ffmpeg rounds to what the file counts in.
-    /// It is the first of those that are shown at once with `index`: ffmpeg tells frames apart by their times. None where
-    /// the file has to be decoded from its beginning.
+    /// From which frame on the file is to be decoded for frame `index`, and within which seconds after its start time
+    /// that one is found: between the frames beside it, and nearer to itself, since ffmpeg rounds to what the file
+    /// counts in. It is the first of those that are shown at once with `index`: ffmpeg tells frames apart by their
+    /// times. None where the file has to be decoded from its beginning.
     pub fn seek_to(&self, index: u64) -> Option<(u64, Range<f64>)> {
         let of_index = self.times.get(usize::try_from(index).ok()?)?;
         let first = self
@@ -198,7 +199,8 @@ fn ask(path: &Path, each: &str) -> io::Result<String> {
 }
 
 /// Whether packets with these times are the frames that are shown. Where a video was cut, the first packets may be of
-/// pictures before the first one, which cannot be made, and some may have no time. Where none has one, frames have none.
+/// pictures before the first one, which cannot be made, and some may have no time. Where none has one, frames have
+/// none.
 fn are_frames(times: &[Option<f64>]) -> bool {
     let Some(Some(first)) = times.first() else {
         return times.iter().all(Option::is_none);

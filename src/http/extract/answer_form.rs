@@ -37,7 +37,8 @@ impl AnswerForm {
 /// Most items of a list in a header that are looked at. Browsers send some five.
 pub const MAX_ITEMS: usize = 64;
 
-/// What a client takes, by a header that is a list: names in lower case, and their qualities (RFC 9110, section 12.4.2).
+/// What a client takes, by a header that is a list: names in lower case, and their qualities (RFC 9110, section
+/// 12.4.2).
 pub fn qualities(headers: &HeaderMap, name: HeaderName) -> impl Iterator<Item = (String, f32)> {
     let values = headers.get_all(name).into_iter();
     let texts = values.filter_map(|value| value.to_str().ok());

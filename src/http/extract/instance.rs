@@ -1,7 +1,7 @@
 //! What names a request to its client: the path, as the client knows it, and the id.
 //!
-//! The id is the client's `x-request-id` where it can be used, so that a trace can be followed through several services,
-//! else a new one.
+//! The id is the client's `x-request-id` where it can be used, so that a trace can be followed through several
+//! services, else a new one.
 
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;

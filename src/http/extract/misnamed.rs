@@ -1,5 +1,5 @@
-//! Files under another name than `frame`, which is the likeliest mistake of all, boxes under another name than `box`, and
-//! settings in the wrong place.
+//! Files under another name than `frame`, which is the likeliest mistake of all, boxes under another name than `box`,
+//! and settings in the wrong place.
 
 use crate::http::problems::problem::Problem;
 use bagtrack_api::ProblemKind as Kind;

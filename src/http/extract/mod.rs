@@ -6,11 +6,11 @@
 //! where a call takes both. Settings come in the query, or as fields of the form or the JSON, which count where the
 //! query has them too. In each of the two a setting may stand once.
 //!
-//! Out: an [`Upload`](uploaded::Upload) with the files and the [`Settings`](bagtrack_api::requests::Settings) type of the route.
-//! Handlers get it by an extractor, which refuses a request as early as it can: first for its query, then for what the
-//! route needs besides (a session, room for one), then for its announced length, a full queue and the client's quota,
-//! and only then for its body. Memory is charged as the bytes of the body arrive, and a place in the queue is taken when
-//! all of them are there.
+//! Out: an [`Upload`](uploaded::Upload) with the files and the [`Settings`](bagtrack_api::requests::Settings) type of
+//! the route. Handlers get it by an extractor, which refuses a request as early as it can: first for its query, then
+//! for what the route needs besides (a session, room for one), then for its announced length, a full queue and the
+//! client's quota, and only then for its body. Memory is charged as the bytes of the body arrive, and a place in the
+//! queue is taken when all of them are there.
 //!
 //! What can go wrong: the body is slow, too large or not what it says; parsed JSON takes many times the memory of its
 //! text; a setting is unknown, doubled or no value of its type. Each is a problem document, and no session changes.

@@ -1,8 +1,8 @@
 //! Multipart uploads: `frame` parts are files, and `snapshot` is one where a route takes it; all others are settings.
 //!
-//! The parser looks through all that it has for the next part whenever a piece comes (docs/upstream/multer.md). So small
-//! pieces are gathered, it gets them only when it can do nothing with what it has, and the head of a part is bounded: a
-//! body costs time in proportion to its bytes.
+//! The parser looks through all that it has for the next part whenever a piece comes (docs/upstream/multer.md). So
+//! small pieces are gathered, it gets them only when it can do nothing with what it has, and the head of a part is
+//! bounded: a body costs time in proportion to its bytes.
 
 use super::body::{self, Buffer, HeadTooLong, MAX_HEAD_BYTES};
 use super::misnamed;
@@ -21,8 +21,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::task::{Context, Poll};
 
-/// Most bytes of the content type. A boundary has at most 70 (RFC 2046, section 5.1.1), and what may be the beginning of
-/// one is looked through again whenever a piece comes.
+/// Most bytes of the content type. A boundary has at most 70 (RFC 2046, section 5.1.1), and what may be the beginning
+/// of one is looked through again whenever a piece comes.
 const MAX_TYPE_BYTES: usize = 256;
 
 /// Pieces of fewer bytes are gathered, as far as they have come.

@@ -10,8 +10,8 @@ use bagtrack_sessions::Session;
 use std::sync::Arc;
 use uuid::Uuid;
 
-/// The id as it stands in the path, and who asks for it. It is looked up by [`SessionPath::find`], after the rest of the
-/// request head has been checked.
+/// The id as it stands in the path, and who asks for it. It is looked up by [`SessionPath::find`], after the rest of
+/// the request head has been checked.
 pub struct SessionPath {
     id: String,
     caller: Caller,

@@ -46,13 +46,13 @@ pub struct Upload<S> {
 }
 
 impl<S: Settings> Upload<S> {
-    /// Lets a request in, reads its body, then takes a place in the queue; `texts` are the settings of the query, where the
-    /// body has none of their names. JSON is parsed on a worker. The place holds the request's permit until its work has
-    /// ended, and the files their memory.
+    /// Lets a request in, reads its body, then takes a place in the queue; `texts` are the settings of the query, where
+    /// the body has none of their names. JSON is parsed on a worker. The place holds the request's permit until its
+    /// work has ended, and the files their memory.
     ///
     /// # Errors
-    /// The request is not let in, the body cannot be read, it has too few or too many frames, a setting is wrong, the queue
-    /// is full, or the client has sent too many frames lately.
+    /// The request is not let in, the body cannot be read, it has too few or too many frames, a setting is wrong, the
+    /// queue is full, or the client has sent too many frames lately.
     pub async fn read(
         state: &AppState,
         texts: Texts,

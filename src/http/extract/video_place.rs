@@ -25,8 +25,8 @@ pub async fn count_frame(state: &AppState, client: &Client) -> Result<(), Proble
 }
 
 impl VideoPlace {
-    /// Waits for a place, as long as a request may. Meanwhile another request may have the place in the queue. A video may
-    /// take the processor time of as many requests as its frames would be posted in.
+    /// Waits for a place, as long as a request may. Meanwhile another request may have the place in the queue. A video
+    /// may take the processor time of as many requests as its frames would be posted in.
     ///
     /// # Errors
     /// The client's other video, or those of others, take longer; or the queue is full after the wait.

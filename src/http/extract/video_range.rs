@@ -40,8 +40,8 @@ pub struct RangeFrame {
     pub file: Bytes,
 }
 
-/// The frames of a range, as they are decoded. Those that are taken backwards are kept as JPEG files, and their bytes are
-/// charged as those of uploads.
+/// The frames of a range, as they are decoded. Those that are taken backwards are kept as JPEG files, and their bytes
+/// are charged as those of uploads.
 #[derive(Debug)]
 pub struct RangeFrames {
     video: VideoFrames,

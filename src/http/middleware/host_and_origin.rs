@@ -1,5 +1,5 @@
-//! Refuses requests that do not name one host, and those that a browser sends for a page of another origin, or under the
-//! name of another host.
+//! Refuses requests that do not name one host, and those that a browser sends for a page of another origin, or under
+//! the name of another host.
 //!
 //! A browser sends "simple" posts of any page without asking first; CORS only hides the answer from the page. So the
 //! origin is checked, too. So is the [host](AllowedHosts).

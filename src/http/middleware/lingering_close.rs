@@ -2,8 +2,8 @@
 //!
 //! If a server answers and closes while the client still sends, the client's system reports a broken connection, and
 //! the problem document is lost. So when an error is answered before the body was read, the rest is read beside the
-//! answer, within bounds: at most as many bytes as a body may have, at [its pace](super::body_pace). A client that waits
-//! for `100 Continue` has sent nothing, and nothing is read from it.
+//! answer, within bounds: at most as many bytes as a body may have, at [its pace](super::body_pace). A client that
+//! waits for `100 Continue` has sent nothing, and nothing is read from it.
 
 use crate::http::state::AppState;
 use axum::body::{Body, Bytes, HttpBody};

@@ -2,8 +2,8 @@
 //!
 //! In: a request. Out: the request, with what was found in its extensions, or a response in its place.
 //!
-//! What can go wrong: a client says that it is another (`X-Forwarded-For` counts only from a trusted proxy), or reads no
-//! answer because it is still sending its body ([`lingering_close`]).
+//! What can go wrong: a client says that it is another (`X-Forwarded-For` counts only from a trusted proxy), or reads
+//! no answer because it is still sending its body ([`lingering_close`]).
 
 pub mod answer_problems;
 pub mod authenticate;

@@ -1,9 +1,9 @@
-//! One line in the log for each request, with the problem that it was answered with; a span around what is logged on its
-//! behalf, and the trace that it belongs to.
+//! One line in the log for each request, with the problem that it was answered with; a span around what is logged on
+//! its behalf, and the trace that it belongs to.
 //!
 //! The span has the ids of the request and of its trace, the client's address, the name of its API key (never the key),
-//! the method, where some call has it, and the path: never bytes or boxes, no more of the path than any route has, and of a
-//! session's id only its beginning. Probes come every few seconds: without `debug` only a refused one has a line,
+//! the method, where some call has it, and the path: never bytes or boxes, no more of the path than any route has, and
+//! of a session's id only its beginning. Probes come every few seconds: without `debug` only a refused one has a line,
 //! which names it, and none has a span.
 
 use super::client_identity::note_address;

@@ -29,8 +29,8 @@ pub async fn live() -> Json<Health> {
 /// bodies is full, or the store of its sessions gives no answer or takes no writes. What was full counts as full until
 /// half of it is free.
 ///
-/// A store that is nearly full is no reason: all replicas share it, and it takes the frames of the sessions that it has.
-/// The answer is 200 then, with the status `store-full`.
+/// A store that is nearly full is no reason: all replicas share it, and it takes the frames of the sessions that it
+/// has. The answer is 200 then, with the status `store-full`.
 #[utoipa::path(
     get, path = "/readyz", tag = "service", operation_id = "getReadiness", security(()),
     responses((status = 200, description = "It does", body = Health))

@@ -15,8 +15,8 @@ const MEDIA_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
 
 /// Metrics for Prometheus
 ///
-/// Counters, gauges and histograms of requests, frames, sessions and work. With `BAGTRACK_METRICS_KEY` they have a key of
-/// their own.
+/// Counters, gauges and histograms of requests, frames, sessions and work. With `BAGTRACK_METRICS_KEY` they have a key
+/// of their own.
 #[utoipa::path(
     get, path = "/metrics", tag = "service", operation_id = "getMetrics",
     responses(

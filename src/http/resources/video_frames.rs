@@ -26,11 +26,11 @@ const COMMENT: [u8; 2] = [0xFF, 0xFE];
 
 /// Get the frames of a video
 ///
-/// A video (MP4, QuickTime, Matroska, WebM, GIF or Motion JPEG; H.264, H.265, VP8, VP9, AV1, MPEG-4, H.263) comes back as
-/// Motion JPEG, a JPEG file after the other: every frame once, at the size of the first one, as soon as it is decoded.
-/// Each file begins with a comment that tells when the frame is shown, in seconds from the video's beginning, for example
-/// `time=1.533333`. The page asks for it where the browser cannot play a file. Where the rest cannot be decoded, the
-/// answer is cut off after the last whole frame, and not ended.
+/// A video (MP4, QuickTime, Matroska, WebM, GIF or Motion JPEG; H.264, H.265, VP8, VP9, AV1, MPEG-4, H.263) comes back
+/// as Motion JPEG, a JPEG file after the other: every frame once, at the size of the first one, as soon as it is
+/// decoded. Each file begins with a comment that tells when the frame is shown, in seconds from the video's beginning,
+/// for example `time=1.533333`. The page asks for it where the browser cannot play a file. Where the rest cannot be
+/// decoded, the answer is cut off after the last whole frame, and not ended.
 ///
 /// `curl --data-binary @clip.mp4 http://localhost:8080/frames -o clip.mjpeg`
 #[utoipa::path(

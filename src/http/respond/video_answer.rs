@@ -41,8 +41,8 @@ pub fn to_reader(state: &AppState, client: &Client, answer: Response) -> Respons
     Response::from_parts(head, Body::from_stream(parts))
 }
 
-/// Sends the parts of an answer, each when the one before was taken, and nothing after the last. An answer that is given
-/// up has no last one.
+/// Sends the parts of an answer, each when the one before was taken, and nothing after the last. An answer that is
+/// given up has no last one.
 async fn send(
     mut answer: BodyDataStream,
     sender: mpsc::Sender<Option<Bytes>>,

@@ -32,8 +32,8 @@ use std::time::SystemTime;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
 
-/// Bytes of an answer that the system takes while it waits to send them. With more, a client that reads slowly but steadily
-/// would for a long time seem to take nothing.
+/// Bytes of an answer that the system takes while it waits to send them. With more, a client that reads slowly but
+/// steadily would for a long time seem to take nothing.
 #[cfg(target_os = "linux")]
 const MAX_UNSENT: u32 = 64 << 10;
 /// How long to wait before looking for room again.
@@ -137,7 +137,8 @@ impl Application {
         self.service.state.access.keys.clone()
     }
 
-    /// What reads the keys of the issuer of tokens again, where one is named. It gives how many there are, and may block.
+    /// What reads the keys of the issuer of tokens again, where one is named. It gives how many there are, and may
+    /// block.
     #[cfg(feature = "jwt")]
     pub fn issuer_keys(
         &self,
@@ -147,16 +148,16 @@ impl Application {
         Some(move || verifier.reload(state.now()))
     }
 
-    /// Serves these routes too: behind the middleware that all requests pass, but not behind those that ask for a key, or
-    /// check the origin and the host.
+    /// Serves these routes too: behind the middleware that all requests pass, but not behind those that ask for a key,
+    /// or check the origin and the host.
     pub fn with_routes(mut self, routes: Router) -> Self {
         self.extra = self.extra.merge(routes);
         self
     }
 
     /// Serves until `shutdown` is ready. Then `/readyz` answers 503 at once, no session can be opened, and all answers
-    /// are marked `Draining: true`. After the configured delay no connection is accepted any more, and open requests get
-    /// the configured time to end; then they are cut off. Returns whether all of them ended in time.
+    /// are marked `Draining: true`. After the configured delay no connection is accepted any more, and open requests
+    /// get the configured time to end; then they are cut off. Returns whether all of them ended in time.
     pub async fn serve<S: Into<Shutdown>>(self, shutdown: impl Future<Output = S>) -> bool {
         let Self {
             listener,

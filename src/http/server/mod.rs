@@ -2,8 +2,8 @@
 //!
 //! In: the settings. Out: an [`Application`](application::Application). [`router`] has all routes.
 //!
-//! What can go wrong: there is no room for a connection, and its client is [told so](refusal); a client does not end its
-//! connection when the service ends, and is cut off.
+//! What can go wrong: there is no room for a connection, and its client is [told so](refusal); a client does not end
+//! its connection when the service ends, and is cut off.
 
 pub mod application;
 pub mod bind_error;

@@ -40,7 +40,8 @@ pub fn router(state: AppState, extra: Router) -> Router {
 }
 
 /// What is served to an address that has no connection left: probes, since a supervisor ends a service that does not
-/// answer them. Whoever asks for something else is told why. Each connection has one answer, so nobody keeps the places.
+/// answer them. Whoever asks for something else is told why. Each connection has one answer, so nobody keeps the
+/// places.
 pub fn probes_only(state: &AppState) -> Router {
     let (probes, _) = routes::probes().split_for_parts();
     let refuse = async || Problem::too_many_connections();

@@ -66,8 +66,8 @@ impl FrameWork {
         Some(Done { answer, skipped })
     }
 
-    /// The permits of a frame. Where there is no place it waits for one, in order of arrival, as long as a plain request
-    /// may.
+    /// The permits of a frame. Where there is no place it waits for one, in order of arrival, as long as a plain
+    /// request may.
     async fn permits(&self) -> Result<(SessionPermit, QueuePermit), Problem> {
         let deadline = clock::now() + self.state.config.work_timeout;
         let session = self.find_until(deadline).await?;

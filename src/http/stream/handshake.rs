@@ -138,9 +138,9 @@ fn max_message_bytes(state: &AppState, session: &Session) -> usize {
     usual.min(state.config.max_frame_bytes)
 }
 
-/// Finds where the session stands, and takes its place for a stream. The stream before this one tracks no further frame,
-/// nor does one at another replica. Waits for the frame at work, of that stream too. A stream that cannot begin leaves
-/// the one before it alone.
+/// Finds where the session stands, and takes its place for a stream. The stream before this one tracks no further
+/// frame, nor does one at another replica. Waits for the frame at work, of that stream too. A stream that cannot begin
+/// leaves the one before it alone.
 async fn begin(
     state: &AppState,
     session: &Arc<Session>,

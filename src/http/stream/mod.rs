@@ -10,9 +10,9 @@
 //!
 //! What can go wrong: the line breaks while frames are on their way, so the last answers of a session are kept, and the
 //! client asks for them. The old line may not know yet that it is broken, so a new stream ends the old one
-//! ([`OpenStreams`](bagtrack_sessions::OpenStreams)). A client says nothing for long: it is pinged. A client reads no answers: the connection ends by
-//! its time limit for writing. A client sends a part of a message and no more, over many streams: memory is charged as
-//! messages arrive ([`Fragments`](bagtrack_net::Fragments)).
+//! ([`OpenStreams`](bagtrack_sessions::OpenStreams)). A client says nothing for long: it is pinged. A client reads no
+//! answers: the connection ends by its time limit for writing. A client sends a part of a message and no more, over
+//! many streams: memory is charged as messages arrive ([`Fragments`](bagtrack_net::Fragments)).
 
 pub mod end;
 pub mod frame_work;

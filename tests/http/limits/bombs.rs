@@ -101,8 +101,8 @@ async fn work_whose_client_has_gone_stops_at_the_next_frame() {
     assert_eq!(view["frames"], 1, "what was done is undone");
 }
 
-/// Times of a frame of forty megapixels after a replay: its own, and that of the slowest answer beside it. A replay takes
-/// next to no time; it once marked the session as one whose frames are cheap.
+/// Times of a frame of forty megapixels after a replay: its own, and that of the slowest answer beside it. A replay
+/// takes next to no time; it once marked the session as one whose frames are cheap.
 async fn beside_a_large_frame(app: &TestApplication) -> (Duration, Duration) {
     let (first, next) = (heavy::large(10), heavy::large(20));
     let response = app.create(first.clone(), &[("box", LARGE_BOX)]).await;

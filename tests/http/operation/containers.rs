@@ -91,7 +91,8 @@ fn the_container_of_https_has_the_limits_of_the_one_without() {
     }
 }
 
-/// ffmpeg writes what it reads of an MP4 or WebM to `/tmp`, where nothing can be written in a container whose files cannot.
+/// ffmpeg writes what it reads of an MP4 or WebM to `/tmp`, where nothing can be written in a container whose files
+/// cannot.
 #[test]
 fn a_read_only_container_has_room_for_videos() {
     let docker = Path::new(env!("CARGO_MANIFEST_DIR")).join("docker");

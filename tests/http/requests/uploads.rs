@@ -99,8 +99,8 @@ async fn a_large_body_that_comes_steadily_has_more_time_than_a_small_one() {
     expect(answer.unwrap(), StatusCode::OK).await;
 }
 
-/// A service whose bodies have to come fast, but may take long in all: that ends with the same answer, so it must not be
-/// what ends these.
+/// A service whose bodies have to come fast, but may take long in all: that ends with the same answer, so it must not
+/// be what ends these.
 async fn with_a_high_least_rate() -> TestApplication {
     let app = TestApplication::start_with(|config| {
         config.body_timeout = Duration::from_secs(600);

@@ -361,8 +361,8 @@ async fn a_stream_does_not_wait_a_round_trip_for_each_frame() {
     panic!("{late:?}");
 }
 
-/// How long a stream of large frames by this address takes, of which eight are on their way: more than that a phone has no
-/// use for.
+/// How long a stream of large frames by this address takes, of which eight are on their way: more than that a phone has
+/// no use for.
 async fn time_of_frames(app: &TestApplication, address: SocketAddr, count: u32) -> Duration {
     let frames: Vec<Vec<u8>> = (0..20).map(large_jpeg).collect();
     let there_and_back = |i: usize| match (i / 20).is_multiple_of(2) {

@@ -15,8 +15,8 @@ const FRAMES: u64 = 60;
 /// In frame 30: the target of the sample clip, and a piece of its ground.
 const BOXES: [&str; 2] = ["55,72,46,58", "200,30,40,40"];
 
-/// The sample clip as an MP4 with B-frames, so that the order of decoding is not that of showing; from frame 45 on it is
-/// an empty scene. It goes with its folder.
+/// The sample clip as an MP4 with B-frames, so that the order of decoding is not that of showing; from frame 45 on it
+/// is an empty scene. It goes with its folder.
 fn clip() -> (TempDir, PathBuf) {
     let folder = command::folder();
     let frames = command::clip(folder.path(), "clip", &["--frames", "60"]);

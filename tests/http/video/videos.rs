@@ -437,8 +437,8 @@ async fn readers_that_take_nothing_lose_their_places_to_a_video_that_waits() {
     let other = async { frames_of("198.51.100.3", &short).await.bytes().await };
     let other = within(other, "a place is given up").await.unwrap();
     assert_eq!(times(&other).len(), FRAMES as usize);
-    // Who has lost its place is told so. The other one has lost it only where a try above ended between the promise of a
-    // place and the place.
+    // Who has lost its place is told so. The other one has lost it only where a try above ended between the promise of
+    // a place and the place.
     let ends = join_all(held.map(Response::bytes)).await;
     assert!(
         ends.iter().any(Result::is_err),

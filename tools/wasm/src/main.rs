@@ -6,8 +6,8 @@
 //! cargo run --locked --package bagtrack-wasm-build
 //! ```
 //!
-//! With `--check` it writes nothing, and fails where the files are not what the source gives. They are the same bytes on
-//! each machine with the same compiler, whose version stands beside them in `rustc.txt`; with another one the check
+//! With `--check` it writes nothing, and fails where the files are not what the source gives. They are the same bytes
+//! on each machine with the same compiler, whose version stands beside them in `rustc.txt`; with another one the check
 //! is left out, and says so.
 
 use std::error::Error;

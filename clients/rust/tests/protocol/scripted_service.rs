@@ -1,5 +1,5 @@
-//! A service that gives the replies of a script, and says where a request is not the script's. docs/PROTOCOL.md describes
-//! the scripts, which are in tests/protocol/exchanges.json.
+//! A service that gives the replies of a script, and says where a request is not the script's. docs/PROTOCOL.md
+//! describes the scripts, which are in tests/protocol/exchanges.json.
 
 use crate::script::{Request, read};
 use serde::Deserialize;

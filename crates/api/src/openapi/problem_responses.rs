@@ -1,5 +1,5 @@
-//! The problems that each operation may answer, and their responses in the OpenAPI document: one for the client's faults
-//! and one for the service's.
+//! The problems that each operation may answer, and their responses in the OpenAPI document: one for the client's
+//! faults and one for the service's.
 
 use crate::ProblemKind as Kind;
 use crate::media_types::PROBLEM;
@@ -97,8 +97,8 @@ fn kinds(operation_id: &str) -> Vec<Kind> {
     kinds.concat()
 }
 
-/// The problem responses of an operation, by their classes of statuses. Each kind leads to its section of the page about
-/// problems, which stands beside the document's.
+/// The problem responses of an operation, by their classes of statuses. Each kind leads to its section of the page
+/// about problems, which stands beside the document's.
 pub(super) fn problem_responses(operation_id: &str) -> Map<String, Value> {
     let mut by_class: BTreeMap<u16, Vec<Kind>> = BTreeMap::new();
     for kind in kinds(operation_id).into_iter().chain([Kind::Internal]) {

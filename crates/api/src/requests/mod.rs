@@ -1,7 +1,7 @@
 //! What the calls take: the settings of each, as the service reads them, and the bodies that have them.
 //!
-//! In: the texts of settings, from the query, a form or a JSON object. Out: a struct for each call. Its schema, and those
-//! of the bodies with the same settings, go into the OpenAPI document; so the document says what is read.
+//! In: the texts of settings, from the query, a form or a JSON object. Out: a struct for each call. Its schema, and
+//! those of the bodies with the same settings, go into the OpenAPI document; so the document says what is read.
 //!
 //! What can go wrong: a setting is unknown or no value of its type, which reading refuses with the setting's name.
 

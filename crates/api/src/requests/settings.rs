@@ -140,8 +140,8 @@ pub struct TrackSettings {
     /// CVAT for video 1.1 or Label Studio.
     #[param(value_type = FileFormatText, inline, required = false)]
     pub format: Option<FileFormat>,
-    /// With `format`, what the targets are called, in their order: `van,rider`, or a JSON array of texts. The others are
-    /// called `Object 1`, `Object 2`, …
+    /// With `format`, what the targets are called, in their order: `van,rider`, or a JSON array of texts. The others
+    /// are called `Object 1`, `Object 2`, …
     #[param(value_type = NamesText, inline, required = false)]
     pub names: Option<Names>,
     /// With `format`, what the video is called in the file: its name, or for `label-studio` its address.

@@ -16,15 +16,15 @@ const MAX_FILE: u64 = 1 << 30;
 #[cfg(target_os = "linux")]
 const MAX_FILES: u64 = 64;
 
-/// What starts the decoder: a program with its own arguments before the decoder's name, which gives up rights and becomes
-/// it. Without words the decoder is started by itself.
+/// What starts the decoder: a program with its own arguments before the decoder's name, which gives up rights and
+/// becomes it. Without words the decoder is started by itself.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Launcher {
     /// The program and its arguments.
     pub words: Vec<OsString>,
-    /// Whether the decoder can open no file then but the system's programs and libraries, and write none at all. It gets
-    /// the video as a file without a name, and may read files; otherwise it gets a pipe, and may only keep what it has
-    /// read from that.
+    /// Whether the decoder can open no file then but the system's programs and libraries, and write none at all. It
+    /// gets the video as a file without a name, and may read files; otherwise it gets a pipe, and may only keep what it
+    /// has read from that.
     pub hides_files: bool,
 }
 

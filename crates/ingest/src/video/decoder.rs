@@ -21,8 +21,8 @@ const FORMATS: &str = "mov,matroska,gif,mjpeg";
 const CODECS: &str = "h264,hevc,vp8,vp9,av1,libdav1d,libaom-av1,mpeg4,h263,mjpeg,gif";
 /// The file without a name that is the program's input, which it can go back in.
 const NAMELESS: &str = "file:/proc/self/fd/0";
-/// The program counts the pixels of a picture with a width that is rounded up to 64. So many more are let through here, as
-/// for a height of 8192; whoever decodes the picture compares its own size with the limit.
+/// The program counts the pixels of a picture with a width that is rounded up to 64. So many more are let through here,
+/// as for a height of 8192; whoever decodes the picture compares its own size with the limit.
 const PADDING: u64 = 63 * 8192;
 /// More pictures than any video has.
 const MAX_PICTURES: usize = 1 << 30;
@@ -101,8 +101,8 @@ impl Drop for Stop {
 }
 
 impl VideoDecoder {
-    /// Begins to decode these bytes with this program, which `launcher` starts where it has any words. It may take as long as
-    /// copying the bytes.
+    /// Begins to decode these bytes with this program, which `launcher` starts where it has any words. It may take as
+    /// long as copying the bytes.
     ///
     /// # Errors
     /// The program cannot be started.
@@ -117,8 +117,8 @@ impl VideoDecoder {
         Self::start(source, program, limits, Strictness::All)
     }
 
-    /// Begins to decode a file of this machine: from its first picture, or from the first one that is shown within these
-    /// seconds after the file's start time. A file without an index may begin later than that.
+    /// Begins to decode a file of this machine: from its first picture, or from the first one that is shown within
+    /// these seconds after the file's start time. A file without an index may begin later than that.
     ///
     /// # Errors
     /// The program cannot be started.
@@ -223,8 +223,8 @@ impl VideoDecoder {
         }
     }
 
-    /// Whether first pictures could not be made, and others can be had by beginning anew: a picture is missing that they
-    /// are made from, which H.264 tells and H.265 passes over.
+    /// Whether first pictures could not be made, and others can be had by beginning anew: a picture is missing that
+    /// they are made from, which H.264 tells and H.265 passes over.
     fn misses_first(
         &self,
         source: &Source,
@@ -387,7 +387,8 @@ fn arguments(input: &[&OsStr], limits: VideoLimits, strictness: Strictness) -> V
         "-frames:v",
         &count,
     ];
-    // The encoder refuses two pictures in the time of one. The colours of a JPEG file are those of BT.601 in full range.
+    // The encoder refuses two pictures in the time of one. The colours of a JPEG file are those of BT.601 in full
+    // range.
     let filters = "setpts='if(isnan(PREV_OUTPTS),PTS,max(PTS,PREV_OUTPTS+1))',scale=out_color_matrix=bt601:out_range=full";
     let coded = [
         "-c:v", "mjpeg", "-q:v", "2", "-pix_fmt", "yuvj420p", "-threads", "1",
@@ -437,7 +438,8 @@ fn end(child: &mut Child) {
     let _ = child.wait();
 }
 
-/// The pictures, and the damage, that a program tells which writes and says these bytes; so that fuzzing needs no program.
+/// The pictures, and the damage, that a program tells which writes and says these bytes; so that fuzzing needs no
+/// program.
 ///
 /// # Errors
 /// What is written cannot be read.

@@ -1,7 +1,7 @@
 //! Videos to pictures, by an installed `ffmpeg`.
 //!
-//! In: the bytes of a video, or a file. Out: its pictures in order, as JPEG files of high quality with their times, which
-//! then go the way of uploaded frames.
+//! In: the bytes of a video, or a file. Out: its pictures in order, as JPEG files of high quality with their times,
+//! which then go the way of uploaded frames.
 //!
 //! A video comes from anywhere, and its decoder is a large program in C. So it runs in a process of its own: it reads
 //! one file or pipe and writes another, knows no other protocol, few formats and few codecs, and its memory, processor
@@ -12,8 +12,8 @@
 //! that would be. Before the first picture it may be begun anew, since a video that was cut may begin with pictures
 //! that need others before the cut.
 //!
-//! What can go wrong: there is no `ffmpeg`, it cannot decode the video, or that takes more than it may. Of what it says the
-//! first line is told, which names the cause.
+//! What can go wrong: there is no `ffmpeg`, it cannot decode the video, or that takes more than it may. Of what it says
+//! the first line is told, which names the cause.
 
 mod child;
 mod decoder;

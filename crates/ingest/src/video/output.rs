@@ -18,7 +18,8 @@ const MAX_LINE: u64 = 256;
 pub struct VideoPicture {
     /// A JPEG file.
     pub jpeg: Vec<u8>,
-    /// When it is shown, in seconds from where decoding began: the start time of the file, or the time that was asked for.
+    /// When it is shown, in seconds from where decoding began: the start time of the file, or the time that was asked
+    /// for.
     pub time: f64,
 }
 

@@ -196,8 +196,8 @@ fn is_memory(line: &str) -> bool {
     line.contains("allocat") || line.contains("(-12 ")
 }
 
-/// Whether a line says that a picture is missing which others are made from, or what is told before such a picture, as at
-/// the start of a recording that begins between two of them.
+/// Whether a line says that a picture is missing which others are made from, or what is told before such a picture, as
+/// at the start of a recording that begins between two of them.
 fn is_reference(line: &str) -> bool {
     let says = [
         // Of H.264 and H.265.

@@ -12,8 +12,8 @@ use std::sync::Arc;
 use std::time::Duration;
 use uuid::Uuid;
 
-/// How long the store tells at most that a session was ended: much longer than any request takes. Later it tells that there
-/// is none. Nobody's quota counts these marks.
+/// How long the store tells at most that a session was ended: much longer than any request takes. Later it tells that
+/// there is none. Nobody's quota counts these marks.
 const TOMBSTONE: Duration = Duration::from_secs(600);
 
 /// What the states of records are read with.

@@ -97,8 +97,8 @@ impl FrameBatch {
     }
 
     /// Takes the frames into `state`: the stored answers if the request was answered before, else those of the tracker.
-    /// The sizes of all frames are checked before the first is decoded; each is decoded in its turn, so that one of them is
-    /// in memory. Between frames `meter` says whether to go on.
+    /// The sizes of all frames are checked before the first is decoded; each is decoded in its turn, so that one of
+    /// them is in memory. Between frames `meter` says whether to go on.
     ///
     /// # Errors
     /// That of the first bad frame, or of a request that costs too much. The state is to be dropped then.

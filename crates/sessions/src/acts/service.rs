@@ -93,8 +93,8 @@ impl SessionService {
 
     /// Runs `work` on a worker, within the time that a request may take.
     ///
-    /// The deadline ends the waiting at once. Work that has begun looks at it between frames, and at whether its client has
-    /// gone. Until it has ended it keeps its permits and the session's lock.
+    /// The deadline ends the waiting at once. Work that has begun looks at it between frames, and at whether its client
+    /// has gone. Until it has ended it keeps its permits and the session's lock.
     ///
     /// # Errors
     /// Its time is over, it waited too long for a worker, it panicked, or its own error.

@@ -1,5 +1,5 @@
-//! Synchronises cached sessions with the store: brings them up to it, renews their time to live, and writes their states
-//! outside of requests.
+//! Synchronises cached sessions with the store: brings them up to it, renews their time to live, and writes their
+//! states outside of requests.
 //!
 //! Memory is a cache of the store: another replica may have gone on with a session that is in memory here.
 
@@ -151,7 +151,8 @@ impl SessionService {
         Err(SessionBusy.into())
     }
 
-    /// A session lives on where there was no room or time for its frame. Otherwise a refused frame does not keep it alive.
+    /// A session lives on where there was no room or time for its frame. Otherwise a refused frame does not keep it
+    /// alive.
     pub async fn renew(&self, session: &Session, in_store: bool) {
         session.renew();
         if let (true, Some(store), Some(version)) = (in_store, &self.store, session.version()) {

@@ -17,12 +17,13 @@ const FIRST_PAUSE: Duration = Duration::from_millis(20);
 const LONGEST_PAUSE: Duration = Duration::from_millis(320);
 
 impl SessionService {
-    /// Waits for the turn of a request whose (first) frame has this number. Meanwhile another request may have its place in
-    /// the queue.
+    /// Waits for the turn of a request whose (first) frame has this number. Meanwhile another request may have its
+    /// place in the queue.
     ///
     /// # Errors
-    /// It has no number, and another request with frames was at the session when it came; or it is early, and has the last
-    /// place at the session; or the session has ended, the store gives no answer, or the queue is full after the wait.
+    /// It has no number, and another request with frames was at the session when it came; or it is early, and has the
+    /// last place at the session; or the session has ended, the store gives no answer, or the queue is full after the
+    /// wait.
     pub async fn wait_for_turn(
         &self,
         permit: &SessionPermit,

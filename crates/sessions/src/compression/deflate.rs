@@ -6,8 +6,8 @@ use super::prefix_code::{self, Code};
 const CHUNK: usize = 4096;
 /// A block that is stored as it is has fewer than 2^16 bytes.
 const MAX_BLOCK: usize = 15 * CHUNK;
-/// What a block of its own must save. Its codes take 600 to 800 bits, the rest is for the time that they take: with half
-/// of this a state has 1.4 % fewer bytes, and takes a seventh longer to write.
+/// What a block of its own must save. Its codes take 600 to 800 bits, the rest is for the time that they take: with
+/// half of this a state has 1.4 % fewer bytes, and takes a seventh longer to write.
 const MIN_SAVED_BITS: f32 = 3000.0;
 const END_OF_BLOCK: usize = 256;
 /// The bytes and the end of a block. The others in the format are for matches.

@@ -80,7 +80,8 @@ mod tests {
             compress(content, &mut bytes);
             bytes.len()
         };
-        // Of four values three have 2 bits, one has 3: the end of the block needs a code, too. They have one code all over.
+        // Of four values three have 2 bits, one has 3: the end of the block needs a code, too. They have one code all
+        // over.
         let of_four = [0, 85, 170, 255].repeat(4096);
         let (least, header) = (16384 * 9 / 4 / 8, 40);
         assert!(compressed(&of_four) < least + header);

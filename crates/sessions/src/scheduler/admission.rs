@@ -68,9 +68,9 @@ pub struct Admission {
 }
 
 impl Admission {
-    /// At most `queue` requests at a time, and one of each client that has none there; at most `workers` quick ones and as
-    /// many slow ones of them at work. Where all requests of a client wait longer than `delay`, those that wait twice as
-    /// long are refused for newer ones; none at zero.
+    /// At most `queue` requests at a time, and one of each client that has none there; at most `workers` quick ones and
+    /// as many slow ones of them at work. Where all requests of a client wait longer than `delay`, those that wait
+    /// twice as long are refused for newer ones; none at zero.
     ///
     /// # Errors
     /// The system gives no threads for the workers.
@@ -121,8 +121,8 @@ impl Admission {
         Ok(QueuePermit::new(request, place))
     }
 
-    /// Waits for a worker and runs `work` on its thread, with the turn that it may give up for a while. If the future is
-    /// dropped before a worker is free, the work is not done; afterwards it keeps its permits until it has ended.
+    /// Waits for a worker and runs `work` on its thread, with the turn that it may give up for a while. If the future
+    /// is dropped before a worker is free, the work is not done; afterwards it keeps its permits until it has ended.
     ///
     /// # Errors
     /// The work panicked, or it waited too long for a worker.

@@ -1,10 +1,10 @@
 //! When a client's requests wait too long: controlled delay with the newest first (Maurer, *Fail at Scale*, 2015, after
 //! CoDel, RFC 8289).
 //!
-//! A burst fills a queue for a moment. A queue that stays helps nobody: no more gets done, and everything is late. So after
-//! an interval in which no wait was within the target, the newest request goes first, which is answered in time, and one
-//! that has waited twice the target is refused, where a newer one waits. A client that sends one at a time is never
-//! refused. This ends after an interval in which none was refused and a request found none before it.
+//! A burst fills a queue for a moment. A queue that stays helps nobody: no more gets done, and everything is late. So
+//! after an interval in which no wait was within the target, the newest request goes first, which is answered in time,
+//! and one that has waited twice the target is refused, where a newer one waits. A client that sends one at a time is
+//! never refused. This ends after an interval in which none was refused and a request found none before it.
 
 use std::time::Duration;
 
@@ -35,7 +35,8 @@ pub(super) enum Order {
 }
 
 impl ControlledDelay {
-    /// Notes how long the oldest request `waited` when its flow's turn comes, `now`, and whether no other one waits there.
+    /// Notes how long the oldest request `waited` when its flow's turn comes, `now`, and whether no other one waits
+    /// there.
     pub(super) fn order(
         &mut self,
         (waited, is_alone): (Duration, bool),

@@ -250,8 +250,8 @@ impl WorkerSlot {
         }
     }
 
-    /// Has an idle worker do `work` for the same request, over and over while it says that there is more and nobody else
-    /// wants a worker. False where none is idle, or all work has one thread.
+    /// Has an idle worker do `work` for the same request, over and over while it says that there is more and nobody
+    /// else wants a worker. False where none is idle, or all work has one thread.
     pub(super) fn share(&self, work: impl Fn() -> bool + Send + 'static) -> bool {
         let (Some(queue), CpuClock::Thread) = (&self.queue, self.cpu) else {
             return false;

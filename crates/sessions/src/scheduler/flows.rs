@@ -91,8 +91,8 @@ impl Faded {
     }
 }
 
-/// Which workers a flow has. Small work has workers of its own, so it never waits until slow work is done; the threads of
-/// slow work have a lower priority. (Size-interval task assignment, with the past as the guess of the size.)
+/// Which workers a flow has. Small work has workers of its own, so it never waits until slow work is done; the threads
+/// of slow work have a lower priority. (Size-interval task assignment, with the past as the guess of the size.)
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum SizeClass {
     Small,
@@ -122,9 +122,9 @@ impl SizeClass {
         }
     }
 
-    /// Time that a flow without work saves up: as much as the flows that always have work are apart, so a client that uses
-    /// less than its share is served before them, and hardly waits for others that come back too. (Borrowed virtual
-    /// time: Duda, Cheriton 1999.)
+    /// Time that a flow without work saves up: as much as the flows that always have work are apart, so a client that
+    /// uses less than its share is served before them, and hardly waits for others that come back too. (Borrowed
+    /// virtual time: Duda, Cheriton 1999.)
     fn claim(self) -> Duration {
         match self {
             Self::Small => SLOW,
@@ -206,8 +206,8 @@ impl<G> Flows<G> {
         waiting.requests.push_back(request);
     }
 
-    /// Which request of a flow is next, whose oldest came at `since`, if that may be refused. Slow work may wait longer: as
-    /// long as it takes itself.
+    /// Which request of a flow is next, whose oldest came at `since`, if that may be refused. Slow work may wait
+    /// longer: as long as it takes itself.
     pub(super) fn order(&mut self, flow: Flow, since: Option<Duration>) -> Order {
         let now = self.time();
         let waiting = self.flows.get_mut(&flow);
@@ -241,8 +241,8 @@ impl<G> Flows<G> {
         length != Job::Batch || is_first || self.begun < self.workers
     }
 
-    /// Which worker a request of a flow may have now. A flow has one worker for small work, so that no client has all of
-    /// them with work that turns out to be slow; the rest of its work borrows the time that nobody else uses.
+    /// Which worker a request of a flow may have now. A flow has one worker for small work, so that no client has all
+    /// of them with work that turns out to be slow; the rest of its work borrows the time that nobody else uses.
     pub(super) fn worker_for(&self, waiting: &Waiting<G>, length: Job) -> Option<SizeClass> {
         let [small, large] = self.running.map(|running| running < self.workers);
         let small = small && waiting.quick == 0;

@@ -8,8 +8,8 @@ use std::any::Any;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Least processor time of decoding a picture, for each of its pixels and for each byte of its file. Most pictures take a
-/// few times as much: those that are surely slow are known before they begin.
+/// Least processor time of decoding a picture, for each of its pixels and for each byte of its file. Most pictures take
+/// a few times as much: those that are surely slow are known before they begin.
 const NANOS_PER_PIXEL: u64 = 4;
 const NANOS_PER_BYTE: u64 = 8;
 
@@ -76,8 +76,8 @@ impl QueuePermit {
         }
     }
 
-    /// For work that cannot grow while it waits, as that of a client which sends no more before it has an answer, or of a
-    /// request with several frames: it waits for a worker, however long that takes.
+    /// For work that cannot grow while it waits, as that of a client which sends no more before it has an answer, or of
+    /// a request with several frames: it waits for a worker, however long that takes.
     pub fn waiting(mut self) -> Self {
         self.request.may_refuse = false;
         self

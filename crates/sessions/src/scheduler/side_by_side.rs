@@ -1,7 +1,7 @@
 //! The parts of one request's work, side by side: on the thread that has it, and on workers that are idle.
 //!
-//! Each thread takes the next part until none is left. So a worker that comes late, or has to go, delays no part but the
-//! one that it is at.
+//! Each thread takes the next part until none is left. So a worker that comes late, or has to go, delays no part but
+//! the one that it is at.
 
 use super::cpu_time::CpuClock;
 use crate::sync::{Condvar, Mutex, PoisonError, lock};

@@ -113,9 +113,9 @@ impl WorkMeter<'_> {
         result
     }
 
-    /// Does `step` to each of `parts`, here and on workers that are idle, and notes its processor time. Before each part
-    /// that is done here it [asks](Self::check) whether to go on. The parts come back in their order, and the results of
-    /// those that were done.
+    /// Does `step` to each of `parts`, here and on workers that are idle, and notes its processor time. Before each
+    /// part that is done here it [asks](Self::check) whether to go on. The parts come back in their order, and the
+    /// results of those that were done.
     ///
     /// # Panics
     /// A step did.

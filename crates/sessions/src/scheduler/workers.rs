@@ -30,8 +30,8 @@ struct State {
 }
 
 impl Workers {
-    /// So many threads, whose priority is lower by `niceness` than that of this thread. They start now: one that a worker
-    /// started would have that worker's priority.
+    /// So many threads, whose priority is lower by `niceness` than that of this thread. They start now: one that a
+    /// worker started would have that worker's priority.
     ///
     /// # Errors
     /// The system gives no more threads.

@@ -11,8 +11,8 @@
 //! state. A replica without the frames in between takes the record over: the frame number goes back to the checkpoint,
 //! and the record's generation goes up, so that no other replica goes on from its own copy.
 //!
-//! A stream that is opened begins a generation too. So a stream at another replica, whose line may be broken without its
-//! knowing, tracks no further frame.
+//! A stream that is opened begins a generation too. So a stream at another replica, whose line may be broken without
+//! its knowing, tracks no further frame.
 //!
 //! What can go wrong, and what is done about it:
 //! - The store is away, slow or full: [`StoreUnavailable`]. Nothing is tracked then.

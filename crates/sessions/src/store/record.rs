@@ -38,8 +38,8 @@ pub struct Version {
 }
 
 impl Version {
-    /// A new record's, at this frame. No other record has had its generation: what was tracked from another one, also of
-    /// the same session, does not go on from this.
+    /// A new record's, at this frame. No other record has had its generation: what was tracked from another one, also
+    /// of the same session, does not go on from this.
     pub fn first(frame: u64) -> Self {
         Self {
             // Below 2⁶², so that it can be counted up as a signed number.

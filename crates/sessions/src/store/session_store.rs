@@ -76,8 +76,8 @@ pub trait SessionStore: Debug + Send + Sync {
     /// Adds a record, unless there is one under this id or the session was ended.
     fn create<'a>(&'a self, id: Uuid, record: &'a Record) -> StoreFuture<'a, Outcome>;
 
-    /// Counts a session that is about to be created against what its client may have in the store. False where it may not
-    /// have it. A session counts as long as its record lives.
+    /// Counts a session that is about to be created against what its client may have in the store. False where it may
+    /// not have it. A session counts as long as its record lives.
     ///
     /// A store that is as short-lived as its process and keeps nothing that left memory need not count.
     fn admit<'a>(&'a self, share: &'a StoreShare, session: Counted) -> StoreFuture<'a, bool> {
@@ -91,8 +91,8 @@ pub trait SessionStore: Debug + Send + Sync {
     /// Moves a record from one version to a frame.
     fn commit(&self, commit: Commit) -> StoreFuture<'_, Outcome>;
 
-    /// Asks whether this version is the newest. `takes_over` says that this replica goes on from the record that a conflict
-    /// tells; `renew` sets the record's time to live.
+    /// Asks whether this version is the newest. `takes_over` says that this replica goes on from the record that a
+    /// conflict tells; `renew` sets the record's time to live.
     fn check(
         &self,
         name: SessionName,
@@ -101,7 +101,8 @@ pub trait SessionStore: Debug + Send + Sync {
         renew: Option<Duration>,
     ) -> StoreFuture<'_, Outcome>;
 
-    /// Begins the next generation of a record, if this version is the newest: no other replica goes on from its own copy.
+    /// Begins the next generation of a record, if this version is the newest: no other replica goes on from its own
+    /// copy.
     fn fence(&self, name: SessionName, version: Version) -> StoreFuture<'_, Outcome>;
 
     /// Ends a session, and remembers for `ttl` that it was ended. False where it had ended before.

@@ -9,7 +9,8 @@ use uuid::Uuid;
 
 const MINUTE: Duration = Duration::from_secs(60);
 const HOUR: Duration = Duration::from_secs(3600);
-/// A minute less than an hour. Where the store is opened anew its clock may differ by moments, so a test looks at minutes.
+/// A minute less than an hour. Where the store is opened anew its clock may differ by moments, so a test looks at
+/// minutes.
 const ALMOST: Duration = Duration::from_secs(3600 - 60);
 
 /// The store after it was closed and has looked for what has expired.

@@ -1,8 +1,8 @@
 //! What earlier releases have written is read by this one, and what later ones write is refused and left as it is.
 //!
-//! `tests/fixtures` has a folder for each release: sessions that stand at frame 2, as snapshots, as records of a Redis (a
-//! file for each field) and in a store's folder, with their frames and the answers of the undisturbed run. A release adds
-//! its own: `BAGTRACK_FIXTURES=tests/fixtures/vX.Y.Z cargo test -p bagtrack-sessions --features redis --test
+//! `tests/fixtures` has a folder for each release: sessions that stand at frame 2, as snapshots, as records of a Redis
+//! (a file for each field) and in a store's folder, with their frames and the answers of the undisturbed run. A release
+//! adds its own: `BAGTRACK_FIXTURES=tests/fixtures/vX.Y.Z cargo test -p bagtrack-sessions --features redis --test
 //! store_protocol formats`.
 
 use crate::common::{FIRST, FLOW, keys, place, request};
@@ -423,7 +423,8 @@ async fn records_of_earlier_releases_go_on_and_those_of_later_ones_are_left_as_t
             for (field, value) in &record {
                 put(&mut link, kind.id(), field, value).await;
             }
-            // A replica of this version, beside one that has begun to write another format of the head, or of the state.
+            // A replica of this version, beside one that has begun to write another format of the head, or of the
+            // state.
             let state = SNAPSHOT_MAGIC.len();
             for (field, at) in [("head", 0), ("state", state)] {
                 let mut later = record[field].clone();

@@ -61,7 +61,8 @@ async fn store_at(port: u16, timeout: Duration) -> RedisStore {
     store.await.unwrap()
 }
 
-/// A way to a Redis, whose connections of before a moment say nothing any more: neither a byte nor that they have ended.
+/// A way to a Redis, whose connections of before a moment say nothing any more: neither a byte nor that they have
+/// ended.
 struct Link {
     port: u16,
     /// How often the connections of before went silent.

@@ -2,8 +2,8 @@
 //!
 //! What has to hold: an answer is that of some history of frames, and to the frame that was sent; an answer that says
 //! `Checkpoint: N` is never taken back up to frame N, neither by the answer to a later request, nor by a 409 to a later
-//! request that asks for an earlier frame; a session that was ended does not come back, and answers nothing that is sent
-//! to another one with its id; and without failures the client gets to the end.
+//! request that asks for an earlier frame; a session that was ended does not come back, and answers nothing that is
+//! sent to another one with its id; and without failures the client gets to the end.
 
 use crate::hostile::HostileStore;
 use crate::memory::Records;
@@ -156,8 +156,8 @@ impl World {
 
     /// Whether an answer after this history takes no other back.
     fn keeps_promises(&self, request: &Request, history: &[u8], checkpoint: usize) -> bool {
-        // What was promised when the request was sent, and what this answer promises. Of what lies between, a late answer
-        // may tell what another has replaced.
+        // What was promised when the request was sent, and what this answer promises. Of what lies between, a late
+        // answer may tell what another has replaced.
         let told = request.promised.max(checkpoint).min(history.len());
         let shared = told.min(self.promised.len());
         let mut promised = request.promised.min(self.promised.len());

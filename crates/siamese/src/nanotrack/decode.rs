@@ -55,8 +55,8 @@ struct Prediction {
     constancy: f64,
 }
 
-/// The box that the head's answer speaks for: `classes` and `edges` are its two outputs, `place` is the last box, and `scale`
-/// the pixels of the search picture to one of the frame. None where the outputs are not those of such a head.
+/// The box that the head's answer speaks for: `classes` and `edges` are its two outputs, `place` is the last box, and
+/// `scale` the pixels of the search picture to one of the frame. None where the outputs are not those of such a head.
 pub(crate) fn decode([classes, edges]: [&Tensor; 2], place: &Rect, scale: f64) -> Option<Sighting> {
     let (2, places, columns) = classes.image()? else {
         return None;

@@ -84,8 +84,8 @@ impl Shape {
         )
     }
 
-    /// Of the results along a side of `size` pixels with `pad` zeros before it those for which the kernel's pixel `at` lies
-    /// in the image.
+    /// Of the results along a side of `size` pixels with `pad` zeros before it those for which the kernel's pixel `at`
+    /// lies in the image.
     fn inside(&self, at: usize, pad: usize, size: usize, results: usize) -> Range<usize> {
         let first = pad.saturating_sub(at).div_ceil(self.stride);
         let end = (size + pad).saturating_sub(at).div_ceil(self.stride);
@@ -93,7 +93,8 @@ impl Shape {
     }
 }
 
-/// All channels into each output: for each pixel of the kernel and each channel a row of what it meets, and one product.
+/// All channels into each output: for each pixel of the kernel and each channel a row of what it meets, and one
+/// product.
 fn over_all(
     image: &Tensor,
     weights: &[f32],
@@ -152,8 +153,8 @@ fn by_channel(
     values: &mut [f32],
     memory: &mut Memory,
 ) {
-    // Columns that are a stride apart lie together, so that neighbours in the result are neighbours in memory. Behind the
-    // last row there is room for a tile that reaches beyond it.
+    // Columns that are a stride apart lie together, so that neighbours in the result are neighbours in memory. Behind
+    // the last row there is room for a tile that reaches beyond it.
     let line = shape.padded.1.div_ceil(shape.stride).next_multiple_of(8);
     let phase = shape.padded.0 * line + TILE + shape.kernel.1;
     let mut padded = memory.filled(phase * shape.stride, 0.0);

@@ -2,8 +2,8 @@
 
 use super::tensor::Tensor;
 
-/// How the numbers of a smaller tensor are repeated beside those of a larger one: each `run` times, and all of them again
-/// and again.
+/// How the numbers of a smaller tensor are repeated beside those of a larger one: each `run` times, and all of them
+/// again and again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Broadcast {
     run: usize,

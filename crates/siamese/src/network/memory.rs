@@ -1,5 +1,5 @@
-//! Buffers that are used again: a run makes some hundred tensors of a few hundred kilobytes, and fresh memory for each would
-//! cost as much as a layer.
+//! Buffers that are used again: a run makes some hundred tensors of a few hundred kilobytes, and fresh memory for each
+//! would cost as much as a layer.
 
 /// No more buffers are kept: a network has fewer tensors at once.
 const MAX_FREE: usize = 16;

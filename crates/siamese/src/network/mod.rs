@@ -6,9 +6,9 @@
 //! - `convolution`, `elementwise`, `product`: what the operations compute.
 //! - `memory`: buffers that are used again.
 //!
-//! In: a [`Graph`](crate::onnx::model::Graph) once, and tensors in each run. Out: tensors. What can go wrong, at the start or
-//! in a run: an operation that is not known, and shapes that do not fit ([`ModelError`](crate::ModelError)). Shapes are those
-//! of one image: the first side of a tensor is 1.
+//! In: a [`Graph`](crate::onnx::model::Graph) once, and tensors in each run. Out: tensors. What can go wrong, at the
+//! start or in a run: an operation that is not known, and shapes that do not fit ([`ModelError`](crate::ModelError)).
+//! Shapes are those of one image: the first side of a tensor is 1.
 
 mod convolution;
 mod elementwise;

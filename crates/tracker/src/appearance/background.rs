@@ -1,8 +1,9 @@
 //! The background: vectors of areas beside the target, their mean and the metric that they make.
 //!
-//! Any two patches with edges look similar, so directions in which the background varies count less. Vectors of areas beside the target
-//! (and of areas that miss it by a third) give a mean and a covariance C, and vectors are compared by
-//! (x - mean)ᵀ (I + C / ridge)⁻¹ (y - mean), as in a linear discriminant analysis ([`Metric`]). Without samples the metric is the plain one and the mean is empty.
+//! Any two patches with edges look similar, so directions in which the background varies count less. Vectors of areas
+//! beside the target (and of areas that miss it by a third) give a mean and a covariance C, and vectors are compared by
+//! (x - mean)ᵀ (I + C / ridge)⁻¹ (y - mean), as in a linear discriminant analysis ([`Metric`]). Without samples the
+//! metric is the plain one and the mean is empty.
 
 use std::collections::VecDeque;
 

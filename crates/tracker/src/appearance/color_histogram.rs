@@ -1,8 +1,8 @@
 //! Colour histograms of the target and of what is around it.
 //!
-//! A target that bends or turns keeps its colours. By Bayes' rule, with equal priors, a pixel of colour c is the target's
-//! with the probability p(c | target) / (p(c | target) + p(c | surroundings)), where both are histograms. Without colour
-//! they are histograms of luma, which tell less.
+//! A target that bends or turns keeps its colours. By Bayes' rule, with equal priors, a pixel of colour c is the
+//! target's with the probability p(c | target) / (p(c | target) + p(c | surroundings)), where both are histograms.
+//! Without colour they are histograms of luma, which tell less.
 //!
 //! Half of the target's histogram stays that of the first frame, so that it does not drift to what covers the target.
 
@@ -56,7 +56,8 @@ pub(crate) struct Scratch {
     bins: Vec<u16>,
 }
 
-/// A part of an image in the pixels of chroma, which are squares of 2 x 2 of luma: columns and rows from `left` and `top`.
+/// A part of an image in the pixels of chroma, which are squares of 2 x 2 of luma: columns and rows from `left` and
+/// `top`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Part {
     pub left: usize,
@@ -98,7 +99,8 @@ impl<'a> ColorPixels<'a> {
         self.luma.height.div_ceil(2) as usize
     }
 
-    /// The part that is `factor` times the box of `particle`, and `margin` working pixels more on each side; on the frame.
+    /// The part that is `factor` times the box of `particle`, and `margin` working pixels more on each side; on the
+    /// frame.
     pub fn part(
         &self,
         particle: &Particle,

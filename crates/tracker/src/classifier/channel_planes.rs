@@ -7,8 +7,8 @@ use crate::features::hog::channels::{CHANNELS, GRAY, LANES};
 
 /// Cells that a dense search goes beyond the window on each side at most: further costs more than the rest of a step.
 pub(crate) const MAX_OFFSET: usize = 24;
-/// The channels after those of a cell: energies of all channels but the gray values, gray values and their squares, each
-/// summed over as many cells to the right as a window is wide.
+/// The channels after those of a cell: energies of all channels but the gray values, gray values and their squares,
+/// each summed over as many cells to the right as a window is wide.
 const WIDE: usize = GRAY + 1;
 const WIDE_COUNT: usize = 3;
 const PLANES: usize = WIDE + WIDE_COUNT;

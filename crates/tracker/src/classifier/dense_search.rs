@@ -2,8 +2,9 @@
 //!
 //! Particles are few, and what is between them is not seen: the further a target may have moved, the wider the gaps.
 //! Areas of one size that are whole cells apart share their cells, so one grid of cells serves all of them, and the
-//! scores are a correlation of the discriminant's weights with the grid ([`sliding_window`](crate::classifier::sliding_window)). Half of the first
-//! particles are then drawn around the maxima, and weighed as all particles are.
+//! scores are a correlation of the discriminant's weights with the grid
+//! ([`sliding_window`](crate::classifier::sliding_window)). Half of the first particles are then drawn around the
+//! maxima, and weighed as all particles are.
 //!
 //! A score here differs a little from that of a particle at the same place: a cell at the edge of an area is normalised
 //! with the cells beyond the edge as well.

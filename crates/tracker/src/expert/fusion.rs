@@ -36,8 +36,8 @@ pub(crate) fn fuse(filter: &Voice, expert: &Voice) -> Rect {
     )
 }
 
-/// The chance that the box of both overlaps the target by half or more: a logistic function of both scores and of how far
-/// they agree, near a regression on annotated videos.
+/// The chance that the box of both overlaps the target by half or more: a logistic function of both scores and of how
+/// far they agree, near a regression on annotated videos.
 pub(crate) fn score(filter: &Voice, expert: &Voice) -> f32 {
     let logit = |score: f32| {
         let chance = f64::from(score).clamp(0.001, 0.999);

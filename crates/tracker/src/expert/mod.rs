@@ -4,9 +4,9 @@
 //! - `second_opinion`: what a session keeps of its expert, and where that looks next.
 //! - `fusion`: the answer that both give together, and its score.
 //!
-//! In: a frame, the filter's answer and score, and the expert's template and place. Out: a box, a score, and whether the
-//! filter goes on from the expert's place. The expert itself comes from outside of this crate: it may be a network with
-//! weights of megabytes, which many sessions share. Nothing fails.
+//! In: a frame, the filter's answer and score, and the expert's template and place. Out: a box, a score, and whether
+//! the filter goes on from the expert's place. The expert itself comes from outside of this crate: it may be a network
+//! with weights of megabytes, which many sessions share. Nothing fails.
 
 pub(crate) mod fusion;
 pub(crate) mod opinion;

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use crate::image::frame::Frame;
 use crate::image::rect::Rect;
 
-/// Finds a target in a frame, near a place, by what it noted of the target before. Boxes are in the pixels of the frame's
-/// luma, which are those of the session's working image.
+/// Finds a target in a frame, near a place, by what it noted of the target before. Boxes are in the pixels of the
+/// frame's luma, which are those of the session's working image.
 ///
 /// An expert has no memory: what it knows of a target is in the template that it made, so that many sessions share an
 /// expert, and a snapshot carries all that a session needs of it. The same inputs give the same answers.
@@ -35,8 +35,8 @@ const IN_DOUBT: f32 = 0.95;
 /// Tells an expert that is asked in doubt alone from the same one that is always asked.
 const IN_DOUBT_FINGERPRINT: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// An expert that is asked only of frames in which the filter's score is below 0.95. In the others the answer and the score
-/// are the filter's, and a frame costs no more than without an expert.
+/// An expert that is asked only of frames in which the filter's score is below 0.95. In the others the answer and the
+/// score are the filter's, and a frame costs no more than without an expert.
 #[derive(Debug, Clone)]
 pub struct InDoubt(pub Arc<dyn Expert>);
 

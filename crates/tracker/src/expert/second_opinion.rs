@@ -157,7 +157,8 @@ impl SecondOpinion {
         }
     }
 
-    /// Whether it may be what a session keeps of an expert with templates of `len` numbers, in working images of this size.
+    /// Whether it may be what a session keeps of an expert with templates of `len` numbers, in working images of this
+    /// size.
     pub fn is_valid_for(&self, len: usize, (width, height): (u32, u32)) -> bool {
         let reach = MAX_SIDES * f64::from(width.max(height));
         let Rect {

@@ -127,9 +127,9 @@ impl Evaluation {
         }
     }
 
-    /// dist(Aᵢ, B\[k\]) (equation 4), in \[0, 1\]: for each candidate its distance to each entry of the bag. `candidates`
-    /// are feature vectors of length D with finite values, one after the other, and `history` the 1 to P previous
-    /// patches, each of length D.
+    /// dist(Aᵢ, B\[k\]) (equation 4), in \[0, 1\]: for each candidate its distance to each entry of the bag.
+    /// `candidates` are feature vectors of length D with finite values, one after the other, and `history` the 1 to P
+    /// previous patches, each of length D.
     ///
     /// # Panics
     /// If no bag was set, there are more than P previous patches or none, or one of them is not of length D.

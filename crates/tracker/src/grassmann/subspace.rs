@@ -79,7 +79,8 @@ impl AffineSubspace {
     }
 }
 
-/// Makes `subspace` that [`of`](AffineSubspace::of) vectors of length `len`, one after the other, in its present memory.
+/// Makes `subspace` that [`of`](AffineSubspace::of) vectors of length `len`, one after the other, in its present
+/// memory.
 #[pulp::with_simd(fit = Arch::new())]
 #[inline(always)]
 pub(crate) fn fit_simd<S: Simd>(

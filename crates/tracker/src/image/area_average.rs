@@ -218,8 +218,8 @@ impl Divisor {
         }
     }
 
-    /// The nearest whole number to the quotient, the larger of two; `value` is a whole number. As long as the divisor is
-    /// below 2^40, what is added to the value outweighs the rounding, and does not reach the next quotient.
+    /// The nearest whole number to the quotient, the larger of two; `value` is a whole number. As long as the divisor
+    /// is below 2^40, what is added to the value outweighs the rounding, and does not reach the next quotient.
     #[inline(always)]
     fn rounded(&self, value: f64) -> u8 {
         ((value + 0.25) * self.inverse + ROUND).to_bits() as u8

@@ -1,8 +1,8 @@
 //! The images that the tracker works on.
 //!
 //! In: luma and chroma of an uploaded frame, 8 bits a value, row by row. Out: the same in the size in which the session
-//! works ([`resolution`]). Coordinates are floating-point *working pixels* from the top-left corner; pixel (0, 0) covers
-//! the square from (0, 0) to (1, 1).
+//! works ([`resolution`]). Coordinates are floating-point *working pixels* from the top-left corner; pixel (0, 0)
+//! covers the square from (0, 0) to (1, 1).
 //!
 //! | file | holds |
 //! |---|---|

@@ -5,15 +5,15 @@
 
 use crate::image::rect::Rect;
 
-/// The longer side of the working image in pixels, where it does not follow the target, and the least where it does: the
-/// paper's pixel lengths hold at this size, and a smaller image would show too little around a large target.
+/// The longer side of the working image in pixels, where it does not follow the target, and the least where it does:
+/// the paper's pixel lengths hold at this size, and a smaller image would show too little around a large target.
 pub const MIN_WORKING_SIDE: u32 = 320;
 /// The longest side of a working image, in pixels. It bounds what a session costs.
 pub const MAX_WORKING_SIDE: u32 = 1280;
 
 /// The size of the working image of uploads of the size `source`, both sides above 0: never larger than these, the
-/// aspect kept, each side rounded to whole pixels. In it `target`, a box in the upload's pixels, has √(width · height) of
-/// `target_side` working pixels, within the limits of the working side. With a `target_side` of 0 the longer side is
+/// aspect kept, each side rounded to whole pixels. In it `target`, a box in the upload's pixels, has √(width · height)
+/// of `target_side` working pixels, within the limits of the working side. With a `target_side` of 0 the longer side is
 /// [`MIN_WORKING_SIDE`].
 pub(crate) fn working_size(source: (u32, u32), target: &Rect, target_side: f64) -> (u32, u32) {
     let longer = source.0.max(source.1);

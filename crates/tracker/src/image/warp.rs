@@ -44,8 +44,8 @@ impl Rotation {
     }
 
     /// `frame` rotated within `window` (working pixels of the rotated image) and a pixel around it, by bilinear
-    /// interpolation; further out are the pixels of `frame` itself. Beyond the edge the edge's pixel counts. The memory of
-    /// `scratch` is used again, and what it held is not seen.
+    /// interpolation; further out are the pixels of `frame` itself. Beyond the edge the edge's pixel counts. The memory
+    /// of `scratch` is used again, and what it held is not seen.
     pub fn apply(&self, frame: &Frame, window: &Rect, scratch: Frame) -> Frame {
         frame.map_planes(scratch, |plane, mut pixels| {
             pixels.clear();

@@ -15,8 +15,8 @@ pub fn chroma_size((width, height): (u32, u32)) -> (u32, u32) {
 const LUMA: [i32; 3] = [19_595, 38_470, 7_471];
 const CHROMA: [[i32; 3]; 2] = [[-11_059, -21_709, 32_768], [32_768, -27_439, -5_329]];
 
-/// The chroma of an image of `size`, Cb and Cr, in pixels twice as large: means of 2 x 2 pixels, or of fewer at the edge.
-/// `rgb` gives each pixel of the image by its index, row by row.
+/// The chroma of an image of `size`, Cb and Cr, in pixels twice as large: means of 2 x 2 pixels, or of fewer at the
+/// edge. `rgb` gives each pixel of the image by its index, row by row.
 pub fn chroma(size: (u32, u32), rgb: impl Fn(usize) -> [u8; 3]) -> [Vec<u8>; 2] {
     let (width, height) = (size.0 as usize, size.1 as usize);
     let (columns, rows) = chroma_size(size);

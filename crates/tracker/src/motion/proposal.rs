@@ -118,8 +118,8 @@ impl SearchContext<'_> {
         Particle { x, y, scale }
     }
 
-    /// The standard deviation of the logarithm of the scale: `std`, and more for a box so small that `blur` working pixels
-    /// are a notable share of its sides.
+    /// The standard deviation of the logarithm of the scale: `std`, and more for a box so small that `blur` working
+    /// pixels are a notable share of its sides.
     fn scale_std(&self, std: f64, blur: f64) -> f64 {
         std.hypot(blur / self.bounds.side(&self.last))
     }

@@ -30,7 +30,8 @@ impl Params {
     }
 
     /// Bytes that a session with these parameters keeps at most: the vectors of the bag and its background, those that
-    /// the bag is made of, and what does not depend on the sizes. A value takes four bytes, or one where it is quantised.
+    /// the bag is made of, and what does not depend on the sizes. A value takes four bytes, or one where it is
+    /// quantised.
     pub fn session_bytes(&self) -> usize {
         let vectors = self.bag_size as usize * (self.basis_dim as usize + 1);
         let kept = vectors + self.background_samples as usize;

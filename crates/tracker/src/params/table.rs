@@ -1,8 +1,8 @@
 //! The table of parameters. Validation, the command line's help and the OpenAPI schema are made from it.
 //!
-//! A preset owns the rest: its structure, and the weights of its extensions. Those are fields of [`Params`] too, so that
-//! an ablation can switch each of them off (`bagtrack-eval --set search=resampled`), but no rows of the table: users of
-//! the service choose between two measured trackers, and not among the thousands that their mixtures make.
+//! A preset owns the rest: its structure, and the weights of its extensions. Those are fields of [`Params`] too, so
+//! that an ablation can switch each of them off (`bagtrack-eval --set search=resampled`), but no rows of the table:
+//! users of the service choose between two measured trackers, and not among the thousands that their mixtures make.
 
 use serde::{Deserialize, Serialize};
 
@@ -90,8 +90,8 @@ macro_rules! parameters {
                 range: parameters!(@range $($min $max)?),
             }),*];
 
-            /// The value of the parameter `name` of the table. Whole numbers above 2⁵³ are rounded. None where there is no
-            /// such parameter.
+            /// The value of the parameter `name` of the table. Whole numbers above 2⁵³ are rounded. None where there is
+            /// no such parameter.
             pub fn value(&self, name: &str) -> Option<f64> {
                 match name {
                     $(stringify!($name) => Some(self.$name as f64),)*
@@ -218,7 +218,8 @@ parameters! {
 }
 
 impl Params {
-    /// Whether a tracker may have an expert beside it: its score must be a probability, and its search begin at the answer.
+    /// Whether a tracker may have an expert beside it: its score must be a probability, and its search begin at the
+    /// answer.
     pub fn takes_expert(&self) -> bool {
         self.discriminant_weight > 0.0 && self.search == Search::Answer
     }
@@ -232,8 +233,8 @@ impl Params {
         }
     }
 
-    /// The parameters of one of several targets that see the same frames, counted from 0: each has draws of its own, and
-    /// those of the first are these.
+    /// The parameters of one of several targets that see the same frames, counted from 0: each has draws of its own,
+    /// and those of the first are these.
     pub fn of_target(&self, target: usize) -> Self {
         let mut params = self.clone();
         params.seed = self

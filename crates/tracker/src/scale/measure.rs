@@ -1,7 +1,7 @@
 //! The scale that the filter measures: the maximum of its response, and how much of the change there is applied.
 //!
-//! The maximum's height measures the certainty: 0.4 to 0.8 on a target in full sight, 0.2 and less where it is covered, turned or
-//! missed. There the scale stays, or it would drift within a few frames.
+//! The maximum's height measures the certainty: 0.4 to 0.8 on a target in full sight, 0.2 and less where it is covered,
+//! turned or missed. There the scale stays, or it would drift within a few frames.
 
 use crate::image::frame::Frame;
 use crate::motion::particles::Particle;
@@ -27,8 +27,8 @@ pub(crate) struct Maximum {
     pub response: f64,
 }
 
-/// How much a measurement counts against the scale of the particles, 0 to 1, of a target with `side` = √(width · height)
-/// working pixels: a pyramid of few pixels tells little.
+/// How much a measurement counts against the scale of the particles, 0 to 1, of a target with `side` = √(width ·
+/// height) working pixels: a pyramid of few pixels tells little.
 fn reliance(side: f64) -> f64 {
     1.0 / (1.0 + (HALF_RELIANCE / side).powi(4))
 }

@@ -85,8 +85,8 @@ fn an_expert_that_agrees_changes_little_and_makes_the_score_sure() {
     }
 }
 
-/// The picture is blank, so the filter finds nothing after a while: then the answer is the expert's, and after some frames
-/// the filter goes on from there.
+/// The picture is blank, so the filter finds nothing after a while: then the answer is the expert's, and after some
+/// frames the filter goes on from there.
 #[test]
 fn where_the_filter_doubts_the_answer_is_the_experts_and_then_the_filter_follows() {
     let expert = Oracle::new(|t| Some((target(if t < 70 { t } else { 5 }), 0.9)));

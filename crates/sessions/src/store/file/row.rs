@@ -79,7 +79,8 @@ impl Row {
     /// The record at its checkpoint. `state` is that which the database has: the number of its frame, and its bytes.
     ///
     /// # Errors
-    /// The head cannot be read, or the state is of another frame: one that damaged files have kept from before or after.
+    /// The head cannot be read, or the state is of another frame: one that damaged files have kept from before or
+    /// after.
     pub(super) fn record(
         &self,
         state: Option<&[u8]>,
@@ -107,8 +108,8 @@ pub fn row_and_state(record: &Record) -> (Vec<u8>, Vec<u8>) {
     (row, with_frame(record.version.frame, &record.state))
 }
 
-/// The record of a row and a state that a folder may have, as a replica gets it that takes it over; so that fuzzing needs
-/// no folder.
+/// The record of a row and a state that a folder may have, as a replica gets it that takes it over; so that fuzzing
+/// needs no folder.
 ///
 /// # Errors
 /// See [`UnreadableRecord`].

@@ -1,7 +1,7 @@
 //! What each client has in the store, of the sessions that this process opened.
 //!
-//! A session may leave memory and stay in the store, so its place there is counted apart: until it is ended, or until its
-//! record has expired, which is looked up when there is no room.
+//! A session may leave memory and stay in the store, so its place there is counted apart: until it is ended, or until
+//! its record has expired, which is looked up when there is no room.
 
 use super::super::record::SessionName;
 use super::super::session_store::{Counted, StoreShare};

@@ -1,8 +1,8 @@
 //! The time by which what is in a folder expires.
 //!
 //! It passes as the monotonic clock does, so that no session ends because the wall clock is set: as that of a small
-//! board without a battery is, soon after its start. The folder has how far the wall clock is ahead of it, so that after
-//! a restart it goes on by the wall clock, and the time between counts.
+//! board without a battery is, soon after its start. The folder has how far the wall clock is ahead of it, so that
+//! after a restart it goes on by the wall clock, and the time between counts.
 
 use crate::clock::Clock;
 use std::time::Duration;

@@ -77,8 +77,8 @@ impl ScriptCall<'_> {
         self
     }
 
-    /// On this hash too, which is made in one transaction with the script. A server that refuses the transaction gets the
-    /// value as the last argument.
+    /// On this hash too, which is made in one transaction with the script. A server that refuses the transaction gets
+    /// the value as the last argument.
     pub(super) fn on_new(&mut self, new: NewHash) -> &mut Self {
         self.key(new.key.clone());
         self.new = Some(new);
@@ -98,8 +98,8 @@ impl ScriptCall<'_> {
             let done = transaction(new, &invocation).query_async(link).await;
             let is_refused = |error: &RedisError| error.clone().into_server_errors().is_some();
             match done {
-                // It does not know the script, or is not the node of this session any more, or has no room. What it says
-                // to the script alone is acted upon.
+                // It does not know the script, or is not the node of this session any more, or has no room. What it
+                // says to the script alone is acted upon.
                 Err(error) if is_refused(&error) => invocation.arg(&new.value[..]),
                 done => return done.map(|(answer,)| answer),
             };

@@ -40,7 +40,8 @@ local function nearly_full()
 end
 ";
 
-/// ARGV: generation, frame, token, incarnation, head, state, milliseconds to live. Answers `{4}` where there is no room.
+/// ARGV: generation, frame, token, incarnation, head, state, milliseconds to live. Answers `{4}` where there is no
+/// room.
 const CREATE: &str = r"
 local key = KEYS[1]
 local token = redis.call('HGET', key, 'token')
@@ -54,8 +55,8 @@ redis.call('PEXPIRE', key, ARGV[7])
 return {1, ARGV[7]}
 ";
 
-/// ARGV: incarnation, milliseconds for which the session is known to have ended. Answers 0 where it had ended before. What is
-/// deleted first makes room, so this works where the memory is used up.
+/// ARGV: incarnation, milliseconds for which the session is known to have ended. Answers 0 where it had ended before.
+/// What is deleted first makes room, so this works where the memory is used up.
 const END: &str = r"
 local key, ended = KEYS[1], KEYS[2]
 local incarnation = redis.call('HGET', key, 'incarnation')
@@ -65,9 +66,10 @@ redis.call('SET', ended, '', 'PX', ARGV[2])
 return is_here and 1 or 0
 ";
 
-/// ARGV: generation, frame before, frame after, token, milliseconds to live, whether the replica goes on from the record
-/// where it has another version ('1' or ''), and the state where it is written. KEYS has a third then, of a hash with the
-/// state alone. Without the state among ARGV, as Lua would copy and hash each of its bytes, this hash becomes the record.
+/// ARGV: generation, frame before, frame after, token, milliseconds to live, whether the replica goes on from the
+/// record where it has another version ('1' or ''), and the state where it is written. KEYS has a third then, of a hash
+/// with the state alone. Without the state among ARGV, as Lua would copy and hash each of its bytes, this hash becomes
+/// the record.
 const COMMIT: &str = r"
 local key, new = KEYS[1], KEYS[3]
 if new and ARGV[7] then
@@ -127,9 +129,9 @@ redis.call('SET', KEYS[1], ARGV[1], 'PX', ARGV[2])
 return ARGV[1]
 ";
 
-/// KEYS: that of a client, whose members are its sessions as `id:incarnation:places:bytes`, by the time (in milliseconds)
-/// when they were looked at last. ARGV: member, time, most places, most bytes, milliseconds to keep the key, a number.
-/// Answers whether the session is counted, and else so many members that were looked at longest ago.
+/// KEYS: that of a client, whose members are its sessions as `id:incarnation:places:bytes`, by the time (in
+/// milliseconds) when they were looked at last. ARGV: member, time, most places, most bytes, milliseconds to keep the
+/// key, a number. Answers whether the session is counted, and else so many members that were looked at longest ago.
 const ADMIT: &str = r"
 local places, bytes = 0, 0
 local function count(member)

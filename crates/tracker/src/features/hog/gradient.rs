@@ -85,7 +85,8 @@ const COMPRESSED: [f32; 256] = {
     compressed
 };
 
-/// Appends the compressed chroma of `pixels` in row `y` of the luma, whose pixels are half as large as those of `plane`.
+/// Appends the compressed chroma of `pixels` in row `y` of the luma, whose pixels are half as large as those of
+/// `plane`.
 #[inline(always)]
 fn compress_chroma(plane: &Plane, pixels: Range<usize>, y: usize, out: &mut Vec<f32>) {
     let row = plane.row(y / 2);

@@ -3,8 +3,8 @@
 //! In: a window of a frame and areas in it, in pixels of that frame. Out: for each area H₁ x H₂ cells of
 //! [`CHANNELS`](channels::CHANNELS) `f32` values.
 //!
-//! Read [`gradient`], [`binning`] and [`integral`] (once a frame), then [`cells`], [`block_norm`] and [`descriptor`] (for
-//! each area). [`channels`] has the order of a cell's values.
+//! Read [`gradient`], [`binning`] and [`integral`] (once a frame), then [`cells`], [`block_norm`] and [`descriptor`]
+//! (for each area). [`channels`] has the order of a cell's values.
 //!
 //! What can go wrong: nothing fails. Outside the window there is no gradient, and black.
 
