@@ -116,8 +116,8 @@ impl DroppedLines {
 }
 
 /// Libraries that log each attempt to reach what is away, hundreds a second. The service says when it goes and comes
-/// back.
-const QUIET: &str = "redis=off";
+/// back. The database of a store in a folder tells each step of being opened.
+const QUIET: &str = "redis=off,fjall=warn,lsm_tree=warn";
 
 /// The filter of this text. A word alone must be a level: a mistyped one would be a module that logs nothing, and all
 /// others would log nothing either.
