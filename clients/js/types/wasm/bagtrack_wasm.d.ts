@@ -110,8 +110,8 @@ export declare class Frame {
     __destroy_into_raw(): number | undefined;
     free(): void;
     /**
-     * A frame of planes, as JPEG has them (Rec. 601, full range): `width` x `height` values of luma and, where there is
-     * colour, Cb and Cr in half of the columns and rows, rounded up.
+     * A frame of planes, as JPEG has them (Rec. 601, full range): `width` x `height` values of luma and, where there
+     * is colour, Cb and Cr in half of the columns and rows, rounded up.
      *
      * # Errors
      * A side of 0, or a plane of another size.
@@ -124,7 +124,8 @@ export declare class Frame {
      */
     static fromPlanes(width: number, height: number, luma: Uint8Array | number[], cb?: Uint8Array | number[] | null, cr?: Uint8Array | number[] | null): Frame;
     /**
-     * A frame of `width` x `height` RGBA pixels row by row, as in `ImageData`. What is transparent is blended over black.
+     * A frame of `width` x `height` RGBA pixels row by row, as in `ImageData`. What is transparent is blended over
+     * black.
      *
      * # Errors
      * A side of 0, or a number of bytes that is not `4 * width * height`.
@@ -220,8 +221,8 @@ export declare class Tracker {
     __destroy_into_raw(): any;
     free(): void;
     /**
-     * What the tracker keeps of the target: for each entry of the bag, oldest first, the gray values of its mean and of
-     * the columns of its basis, each row by row.
+     * What the tracker keeps of the target: for each entry of the bag, oldest first, the gray values of its mean and
+     * of the columns of its basis, each row by row.
      * @returns {Entry[]}
      */
     get bag(): Entry[];
