@@ -24,6 +24,7 @@
 mod calls;
 mod database;
 mod durability;
+mod folder;
 mod row;
 mod rules;
 mod shares;
