@@ -2,7 +2,15 @@
 
 use ipnet::IpNet;
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
+use std::str::FromStr;
 use std::time::Duration;
+
+/// Reads a whole number, which has no unit.
+pub(super) fn parse_whole<N: FromStr>(text: &str) -> Result<N, String> {
+    let bits = 8 * size_of::<N>();
+    let read = text.parse();
+    read.map_err(|_| format!("it must be a whole number from 0 to 2^{bits} - 1, without a unit"))
+}
 
 /// Reads a duration: `10m`, `30s`, `500ms`, or a number of seconds alone.
 ///
@@ -49,6 +57,18 @@ mod tests {
         assert_eq!(read("10m"), Some(Duration::from_secs(600)));
         assert_eq!(read("500ms"), Some(Duration::from_millis(500)));
         assert_eq!((read("-1"), read("ten"), read("")), (None, None, None));
+    }
+
+    #[test]
+    fn what_is_no_whole_number_is_told_what_one_is() {
+        assert_eq!(parse_whole::<u32>("4096"), Ok(4096));
+        for text in ["zwei", "5MB", "1.5", "-1", "4294967296", ""] {
+            let refused = parse_whole::<u32>(text).unwrap_err();
+            assert!(
+                refused.contains("a whole number from 0 to 2^32 - 1"),
+                "{text}: {refused}"
+            );
+        }
     }
 
     #[test]

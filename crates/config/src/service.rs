@@ -3,7 +3,9 @@
 use super::access::AccessConfig;
 use super::base_path::BasePath;
 use super::limits::LimitsConfig;
-use super::settings::{ConfigError, delay, in_range, moment, origins, permits, positive, settings};
+use super::settings::{
+    ConfigError, delay, in_range, moment, origins, permits, positive, settings, threads,
+};
 use super::store::StoreConfig;
 #[cfg(feature = "tls")]
 use super::tls::TlsConfig;
@@ -26,7 +28,7 @@ settings! {
 
         # "Work and queues"
         /// Frames decoded and tracked at the same time [default: the number of cores].
-        workers: Option<usize> = None, |workers| workers.as_ref().map_or(Ok(()), permits);
+        workers: Option<usize> = None, threads;
         /// Requests with a frame that are inside at the same time, the ones at work included.
         queue: usize = 256, permits;
         /// When the oldest frame of a client has waited longer for a worker all the time, for half a second, its newest
@@ -187,6 +189,15 @@ mod tests {
         assert_eq!(
             message,
             "--max-frames (BAGTRACK_MAX_FRAMES) must be at least 1"
+        );
+        let config = Config {
+            workers: Some(100_000),
+            ..Config::default()
+        };
+        let message = config.validate().unwrap_err().to_string();
+        assert_eq!(
+            message,
+            "--workers (BAGTRACK_WORKERS) must be from 1 to 1024"
         );
     }
 

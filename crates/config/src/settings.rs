@@ -5,7 +5,7 @@
 //! and the check of its ranges.
 
 use super::base_path::BasePath;
-use super::flag_values::{parse_duration, parse_listen, parse_network};
+use super::flag_values::{parse_duration, parse_listen, parse_network, parse_whole};
 use bagtrack_cli::ModelFiles;
 use bagtrack_sessions::Durability;
 use clap::builder::{BoolishValueParser, ValueParser};
@@ -80,9 +80,9 @@ macro_rules! values {
 }
 
 values! {
-    u32: value_parser!(u32);
-    u64: value_parser!(u64);
-    usize: value_parser!(usize);
+    u32: parse_whole::<u32>;
+    u64: parse_whole::<u64>;
+    usize: parse_whole::<usize>;
     String: value_parser!(String);
     SocketAddr: parse_listen;
     IpNet: parse_network;
@@ -204,6 +204,12 @@ pub(super) fn positive<T: From<u8> + PartialOrd>(value: &T) -> Result<(), &'stat
 /// At least 1, where it is given.
 pub(super) fn positive_share(value: &Option<usize>) -> Result<(), &'static str> {
     value.as_ref().map_or(Ok(()), positive)
+}
+
+/// As many threads as one process can be expected to start, where their number is given.
+pub(super) fn threads(value: &Option<usize>) -> Result<(), &'static str> {
+    let hold = value.is_none_or(|threads| (1..=1024).contains(&threads));
+    in_range(hold, "from 1 to 1024")
 }
 
 /// As many as a semaphore has at most.
