@@ -6,8 +6,6 @@ Needs the package marionette-driver from PyPI, and firefox-esr and ffmpeg. What 
 no way into the requests of a page, and axe is not run a second time.
 """
 
-import csv
-import io
 import pathlib
 import socket
 import sys
@@ -15,57 +13,28 @@ import tempfile
 import time
 
 from clips import FRAMES, H264, VP8, Clips
-from files import GRAY, check_rows, check_video, sent_box, times_of
+from driven import DrivenPage, whole_file
+from files import sent_box
 from marionette_driver.by import By
 from marionette_driver.marionette import ActionSequence, Marionette
 from service import Service
 
-TO_THE_END = 180
 
-
-class Page:
+class Page(DrivenPage):
     """The page in Firefox."""
 
     def __init__(self, firefox, url):
         self.firefox = firefox
         firefox.navigate(url + "/")
-        self.said("Nothing is uploaded")
+        find = lambda name: firefox.find_element(By.ID, name)
+        super().__init__(find, lambda text: firefox.execute_script(text, sandbox=None))
 
-    def find(self, name):
-        return self.firefox.find_element(By.ID, name)
-
-    def script(self, text):
-        return self.firefox.execute_script(text, sandbox=None)
-
-    def wait(self, what, told):
-        late = time.monotonic() + TO_THE_END
-        while not what():
-            assert time.monotonic() < late, f"{told}; it says: {self.find('message').text}"
-            time.sleep(0.05)
-
-    def said(self, text):
-        self.wait(lambda: text in self.find("message").text, f"no {text!r}")
-
-    def drag(self, box):
-        area = self.script("""
-            const picture = document.getElementById("picture");
-            picture.scrollIntoView({ block: "center" });
-            const { left, top, width } = picture.getBoundingClientRect();
-            return [left, top, width / picture.width];""")
-        left, top, scale = area
-        x, y, width, height = box
-        at = lambda across, down: (round(left + across * scale), round(top + down * scale))
+    def move(self, corners):
         mouse = ActionSequence(self.firefox, "pointer", "mouse", {"pointerType": "mouse"})
-        mouse.pointer_move(*at(x, y)).pointer_down()
-        mouse.pointer_move(*at(x + width / 2, y + height)).pointer_move(*at(x + width, y + height)).pointer_up().perform()
-
-    def saved(self, button, folder):
-        before = set(folder.iterdir())
-        self.find(button).click()
-        new = lambda: [path for path in set(folder.iterdir()) - before if path.suffix != ".part"]
-        self.wait(lambda: new() and all(path.stat().st_size for path in new()), f"{button} saves nothing")
-        self.wait(lambda: not list(folder.glob("*.part")), f"{button} does not finish")
-        return new()[0]
+        mouse.pointer_move(*corners[0]).pointer_down()
+        for corner in corners[1:]:
+            mouse.pointer_move(*corner)
+        mouse.pointer_up().perform()
 
 
 def in_a_hidden_tab(page, path, truth):
@@ -82,23 +51,6 @@ def in_a_hidden_tab(page, path, truth):
     assert page.script("return document.hidden")
     print(f"  {FRAMES} frames in {taken:.1f} s while the tab is hidden")
     assert taken < 0.8 * FRAMES, taken
-
-
-def whole_file(page, path, numbers, truth, downloads):
-    page.find("file").send_keys(str(path))
-    page.said("Draw a box")
-    gray = page.script(f"return ({GRAY})()")
-    assert 50 < gray < 200, f"the first picture has the mean {gray}"
-    page.drag(sent_box(truth[0]))
-    page.said("The video has ended")
-    skipped = page.find("skipped").text
-    table = list(csv.DictReader(io.StringIO(page.saved("save-csv", downloads).read_text())))
-    times = times_of(path)
-    check_rows(table, path, truth, numbers, times)
-    assert skipped == "0", skipped
-    video = page.saved("save-video", downloads)
-    # The last frame stays as long as the others do on the average.
-    check_video(video, numbers, times[-1] + times[-1] / (len(times) - 1))
 
 
 def free_port():
