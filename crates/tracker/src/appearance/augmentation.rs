@@ -1,14 +1,14 @@
 //! Augmentation of the first box's image: copies rotated by some degrees either way.
 //!
 //! A subspace of one vector is a point. With two rotated copies the first subspace spans what the target looks like
-//! when it tilts, from the first frame on. The frame is rotated, so the rim shows what would be there.
+//! when it tilts, from the first frame on. The whole frame is rotated, so a copy shows the surroundings at its rim.
 
 use crate::params::table::Params;
 
 /// Rotated copies at most.
 pub(crate) const MAX_VIEWS: usize = 2;
 
-/// The angles of the copies, in radians; none where that is off.
+/// The angles of the copies, in radians; none where augmentation is off.
 pub(crate) fn angles(params: &Params) -> impl Iterator<Item = f64> + use<> {
     let angle = params.augmentation_angle.to_radians();
     [angle, -angle].into_iter().filter(|angle| *angle != 0.0)

@@ -17,16 +17,16 @@ use crate::features::quantized::QuantizedVector;
 use crate::motion::particles::{Particle, StateBounds};
 use crate::params::table::Params;
 
-/// Areas are off by more than this share of the box along x or y: nearer ones show mostly the target.
+/// An area is off the target by more than this share of the box along x or y: a nearer one shows mostly the target.
 const INNER: f64 = 0.3;
-/// Areas are off by at most this multiple of the box along x and y.
+/// An area is off the target by at most this multiple of the box along x and y.
 const OUTER: f64 = 1.5;
 /// The box counts as at least this long on a side, in working pixels, so that areas beside a tiny target differ.
 const MIN_SIDE: f64 = 16.0;
 /// Frames from one refresh of the samples to the next.
 const REFRESH_EVERY: u64 = 10;
-/// The ridge of the covariance, as a multiple of its mean eigenvalue. It leaves single precision its digits: a vector
-/// that lies among the samples keeps one part in D of its squared length.
+/// The ridge of the covariance, as a multiple of its mean eigenvalue. With this ridge single precision suffices: a
+/// vector in the span of the samples keeps one part in D of its squared length.
 const RIDGE: f64 = 1.0;
 /// The share of the samples that a refresh replaces.
 const REFRESHED: f64 = 0.2;
@@ -51,7 +51,8 @@ pub(crate) struct Scratch {
 }
 
 impl Background {
-    /// How many new samples frame `number` brings: all in the first frame, some in every so many of the others.
+    /// How many new samples frame `number` brings: all in frame 0, a share every [`REFRESH_EVERY`] frames, none in
+    /// other frames.
     pub fn wanted(number: u64, params: &Params) -> usize {
         let all = params.background_samples as usize;
         if number == 0 {
@@ -75,7 +76,7 @@ impl Background {
         learn(self, params, scratch);
     }
 
-    /// Takes what follows from the samples from `known`, if that has the same ones.
+    /// Copies the mean and the metric of `known` if it has the same samples. Tells whether it has.
     pub fn take_known(&mut self, known: &Self) -> bool {
         let is_known = self.samples == known.samples;
         if is_known {
@@ -110,7 +111,7 @@ impl Background {
     }
 }
 
-/// Learns what follows from the samples.
+/// Computes the mean and the metric from the samples.
 #[pulp::with_simd(learn = Arch::new())]
 #[inline(always)]
 pub(crate) fn learn_simd<S: Simd>(
@@ -133,7 +134,8 @@ pub(crate) fn learn_simd<S: Simd>(
     background.metric.fit(vectors, len, RIDGE, metric);
 }
 
-/// Draws `count` areas beside the target into `out`, as far as they can be had inside the frame.
+/// Draws `count` areas beside the target into `out`. Their centres are in the frame, unless a number of draws finds no
+/// such place.
 pub(crate) fn areas(
     target: &Particle,
     bounds: &StateBounds,
@@ -155,7 +157,7 @@ pub(crate) fn areas(
         (0.0..=bounds.frame_width).contains(&area.x)
             && (0.0..=bounds.frame_height).contains(&area.y)
     };
-    // A target that fills the frame has nothing beside it that is inside.
+    // Beside a target that fills the frame there is no place in the frame, so the number of draws is bounded.
     let tries = 20;
     let area = |_| {
         let mut area = draw(generator);

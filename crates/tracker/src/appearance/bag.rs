@@ -31,7 +31,8 @@ impl<E: Default> Bag<E> {
         self.entries.push_back(latest);
     }
 
-    /// Admits the subspace of a box that the user gave. Where the first entry is pinned, this one takes its place.
+    /// Admits the subspace of a box that the user gave. Where `params` pin the first entry, the new entry becomes the
+    /// first; the one that was pinned is now an entry as any other.
     pub fn admit_pinned(&mut self, params: &Params, fit: impl FnOnce(&mut E)) {
         self.admit(params, fit);
         if params.pinned_entries() > 0 {
@@ -54,7 +55,8 @@ pub(crate) struct History<V> {
 }
 
 impl<V: Default> History<V> {
-    /// Appends the newest vector, which `set` makes. When there are P, the oldest leaves, and gives its memory to it.
+    /// Appends the newest vector, which `set` makes. When there are P, the oldest leaves, and gives its memory to the
+    /// newest.
     pub fn push(&mut self, params: &Params, set: impl FnOnce(&mut V)) {
         let mut newest = V::default();
         if self.vectors.len() >= params.history as usize {

@@ -8,13 +8,13 @@ use crate::appearance::bag::Bag;
 use crate::appearance::span::Span;
 use crate::linalg::fixed_point::FixedPoint;
 
-/// The rows, each of length D, and what is known of them beside.
+/// The rows, each of length D, and what the distances need besides the products with the rows.
 #[derive(Debug, Default)]
 pub(crate) struct BagMatrix {
     pub rows: FixedPoint,
-    /// The rows as they are computed.
+    /// Buffer: the rows in single precision.
     values: Vec<f32>,
-    /// The templates of an entry.
+    /// Buffer: the templates of an entry.
     templates: Vec<f32>,
     /// The number of samples, and L⁻¹ of the metric.
     pub samples: usize,
@@ -25,8 +25,8 @@ pub(crate) struct BagMatrix {
     pub background_coordinates: Vec<f32>,
 }
 
-/// Loads the bag and the background's metric, for vectors of length `len`, and two vectors whose products are asked for
-/// as well (each of that length, or empty).
+/// Loads the bag and the background's metric, for vectors of length `len`. `queries` are two more vectors whose
+/// products with the candidates are wanted, each of that length or empty.
 #[pulp::with_simd(load = Arch::new())]
 #[inline(always)]
 pub(crate) fn load_simd<S: Simd>(

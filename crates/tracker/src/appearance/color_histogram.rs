@@ -30,9 +30,9 @@ const RATE: f32 = 0.04;
 const SURROUNDINGS_RATE: f32 = 0.08;
 /// The share of the first frame's histogram that stays.
 const FIRST_SHARE: f32 = 0.5;
-/// Less is nothing: a colour that was not seen for a hundred frames.
+/// A bin with less is emptied: its colour was not seen for some hundred frames.
 const MIN_BIN: f32 = 1e-6;
-/// The mass that a colour never seen has, and the target's part of it: such colours are rather not the target's.
+/// The prior mass of a colour, and the target's share of it: a colour never seen is rather not the target's.
 const PRIOR_MASS: f32 = 2e-4;
 const PRIOR_TARGET: f32 = 0.3;
 
@@ -56,8 +56,8 @@ pub(crate) struct Scratch {
     bins: Vec<u16>,
 }
 
-/// A part of an image in the pixels of chroma, which are squares of 2 x 2 of luma: columns and rows from `left` and
-/// `top`.
+/// A part of an image, in pixels of chroma, each a square of 2 x 2 pixels of luma: the columns from `left` to before
+/// `right`, the rows from `top` to before `bottom`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Part {
     pub left: usize,
@@ -66,7 +66,7 @@ pub(crate) struct Part {
     pub bottom: usize,
 }
 
-/// The pixels of `frame` for histograms.
+/// The pixels of a frame that histograms count: squares of 2 x 2 pixels of luma.
 #[derive(Clone, Copy)]
 pub(crate) struct ColorPixels<'a> {
     luma: &'a Plane,
@@ -75,7 +75,7 @@ pub(crate) struct ColorPixels<'a> {
 }
 
 impl<'a> ColorPixels<'a> {
-    /// Those of `frame`, for a session in colour where `has_color`.
+    /// The pixels of `frame`; `has_color` tells whether the session sees colour.
     pub fn of(frame: &'a Frame, has_color: bool) -> Self {
         Self {
             luma: &frame.luma,
@@ -84,23 +84,23 @@ impl<'a> ColorPixels<'a> {
         }
     }
 
-    /// Working pixels along a side of a pixel.
+    /// The side of a pixel, in working pixels.
     pub fn side(&self) -> f64 {
         2.0 * f64::from(self.luma.pixel_side)
     }
 
-    /// How many there are in a row.
+    /// How many pixels there are in a row.
     pub fn columns(&self) -> usize {
         self.luma.width.div_ceil(2) as usize
     }
 
-    /// How many there are in a column.
+    /// How many pixels there are in a column.
     pub fn rows(&self) -> usize {
         self.luma.height.div_ceil(2) as usize
     }
 
-    /// The part that is `factor` times the box of `particle`, and `margin` working pixels more on each side; on the
-    /// frame.
+    /// The part that is `factor` times the box of `particle`, and `margin` working pixels more on each side, clipped to
+    /// the frame.
     pub fn part(
         &self,
         particle: &Particle,
@@ -151,7 +151,8 @@ impl<'a> ColorPixels<'a> {
         for channel in 0..2 {
             let row = self.chroma.map(|planes| planes[channel].row(y));
             let row = row.unwrap_or(&[NEUTRAL as u8]);
-            // In larger pixels the luma may have a column more. There the edge's value counts.
+            // Where pixels are larger than working pixels, the luma may have a column more than the chroma. That column
+            // takes the chroma of the edge.
             let values = row
                 .get(part.left..row.len().min(part.right))
                 .unwrap_or_default();
@@ -171,7 +172,7 @@ impl<'a> ColorPixels<'a> {
 #[inline(always)]
 fn luma_bin(upper: [u8; 2], lower: [u8; 2]) -> u16 {
     let [upper, lower] = [upper, lower].map(|pair| {
-        // A pair in one number becomes vector instructions.
+        // The compiler vectorises the sum of a pair that is read as one number.
         let pair = u16::from_le_bytes(pair);
         (pair & 0xff) + (pair >> 8)
     });
@@ -254,7 +255,7 @@ impl ColorHistogram {
         );
     }
 
-    /// Whether this may be the histogram of a tracker that has one where `is_on`.
+    /// Whether this may be the histogram of a tracker; `is_on` tells whether that tracker uses histograms.
     pub fn is_valid_for(&self, is_on: bool, has_color: bool) -> bool {
         let count = if is_on { Self::bin_count(has_color) } else { 0 };
         [&self.first, &self.target, &self.surroundings]

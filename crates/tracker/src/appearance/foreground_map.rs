@@ -5,14 +5,14 @@ use crate::appearance::color_histogram::{ColorHistogram, ColorPixels, Part};
 use crate::linalg::scratch::clear_and_reserve;
 use crate::motion::particles::{Particle, StateBounds};
 
-/// How much larger than the last box boxes may be.
+/// How many times as large as the last box a box may be.
 const SCALE_MARGIN: f64 = 1.2;
 
 /// The integral image of the probabilities minus a half, and its buffers.
 #[derive(Debug, Default)]
 pub(crate) struct ForegroundMap {
     part: Part,
-    /// Working pixels along a side of a pixel.
+    /// The side of a pixel of the map, in working pixels.
     side: f64,
     /// For each corner of a pixel of the part the sum over what is above and left of it; empty where nothing is known.
     sums: Vec<f32>,
@@ -21,7 +21,7 @@ pub(crate) struct ForegroundMap {
 }
 
 impl ForegroundMap {
-    /// Becomes the map of the frame of `pixels` for boxes within `radius` working pixels of that of `center`.
+    /// Becomes the map of the frame of `pixels` for boxes within `radius` working pixels of the box of `center`.
     pub fn compute(
         &mut self,
         pixels: ColorPixels<'_>,
@@ -30,7 +30,7 @@ impl ForegroundMap {
         radius: f64,
         bounds: &StateBounds,
     ) {
-        // Room for the widest search at once.
+        // Room for the widest search, so that no later frame allocates.
         clear_and_reserve(&mut self.sums, (pixels.columns() + 1) * (pixels.rows() + 1));
         if !histogram.has_learned() {
             return;
@@ -53,8 +53,8 @@ impl ForegroundMap {
         }
     }
 
-    /// The sum over the box of `particle`, as a share of the box's area at `scale`: -1/2 to 1/2 where the two have the
-    /// same scale. 0 where nothing is known.
+    /// The sum over the box of `particle`, as a share of the box's area at `scale`: -1/2 to 1/2 where `particle` has
+    /// that scale. 0 where nothing is known.
     #[inline(always)]
     pub fn mean(&self, particle: &Particle, scale: f64, bounds: &StateBounds) -> f64 {
         if self.sums.is_empty() {

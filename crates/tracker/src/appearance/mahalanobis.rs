@@ -73,7 +73,7 @@ impl Metric {
 }
 
 /// Cholesky's factorisation of a matrix of `count` rows, of which the upper triangle is read: the upper triangle
-/// becomes Lᵀ. No pivot is less than `least` but by rounding.
+/// becomes Lᵀ. Only rounding makes a pivot less than `least`.
 #[inline(always)]
 fn factorize(matrix: &mut [f64], count: usize, least: f64) {
     for k in 0..count {

@@ -29,7 +29,7 @@ pub(crate) struct Vectors<'a> {
     pub squares: &'a [f32],
 }
 
-/// What candidates are compared with in a frame. A thread has one for the sessions of both models.
+/// What candidates are compared with in a frame. A thread has one value, for sessions of either model.
 #[derive(Debug, Default)]
 pub(crate) struct Comparison {
     pub printed: Evaluation,
@@ -46,11 +46,11 @@ pub(crate) struct Scratch {
 
 /// What a step asks of the target's appearance. Vectors are feature vectors of length D, one after the other.
 pub(crate) trait AppearanceModel {
-    /// Starts from a box that the user gave in `views`, the first of them upright: the bag gains an entry, which is
-    /// pinned if entries are, and the history begins anew.
+    /// Starts from a box that the user gave. `views` are the vectors of its image, the first upright, the others
+    /// rotated: the bag gains their subspace, pinned where `params` pin the first entry, and the history begins anew.
     fn restart(&mut self, views: &[f32], params: &Params, scratch: &mut Scratch);
 
-    /// (C) Learns the vector of the answer to frame `number`: every W-th frame for the bag too.
+    /// (C) Adds the vector of the answer to frame `number` to the history and, every W-th frame, a subspace to the bag.
     fn learn(&mut self, answer: &[f32], number: u64, params: &Params, scratch: &mut Scratch);
 
     /// Loads the bag, and two vectors for [`query_products`](Self::query_products).
@@ -65,7 +65,8 @@ pub(crate) trait AppearanceModel {
         distances: &mut Vec<f64>,
     );
 
-    /// The products of the `count` candidates that were compared last with the two vectors, where comparing makes them.
+    /// The products of the `count` candidates that were compared last with the two vectors given to
+    /// [`load`](Self::load); none where the model does not compute them.
     fn query_products<'a>(
         &self,
         count: usize,
@@ -75,7 +76,7 @@ pub(crate) trait AppearanceModel {
     /// The bag as vectors, oldest first.
     fn subspaces(&self, params: &Params) -> Vec<AffineSubspace>;
 
-    /// Whether a tracker with `params` may have this, no absolute value above `max`.
+    /// Whether this may be the appearance of a tracker with `params`, with no absolute value above `max`.
     fn is_valid_for(&self, params: &Params, max: f32) -> bool;
 
     /// How many areas beside the target [`learn_background`](Self::learn_background) wants of frame `number`.
@@ -86,13 +87,14 @@ pub(crate) trait AppearanceModel {
     /// Learns the vectors of areas beside the target.
     fn learn_background(&mut self, _vectors: &[f32], _params: &Params, _scratch: &mut Scratch) {}
 
-    /// What is subtracted from vectors before they are compared: the background's mean, or nothing, where it is empty.
+    /// What is subtracted from vectors before they are compared: the background's mean; empty where nothing is
+    /// subtracted.
     fn mean(&self) -> &[f32] {
         &[]
     }
 
-    /// Computes what a snapshot does not carry. What follows from templates and samples that `known` has too is taken
-    /// from there.
+    /// Computes what a snapshot does not carry. Where `known` has the same samples and templates, what follows from
+    /// them is copied from `known`.
     fn restore(&mut self, _known: Option<&Appearance>, _params: &Params, _scratch: &mut Scratch) {}
 }
 

@@ -25,7 +25,7 @@ const GROUP: usize = 32;
 #[derive(Debug, Default)]
 pub(crate) struct PointDistance {
     pub matrix: BagMatrix,
-    /// For each row of the matrix its products with all candidates; then, for the entries, under the metric.
+    /// For each row of the matrix its products with all candidates. Those of the entries' rows are under the metric.
     products: Vec<f32>,
     /// The candidates, and scratch for their products.
     candidates: FixedPoint,
@@ -62,7 +62,7 @@ impl PointDistance {
         [rows - 2, rows - 1].map(|row| &self.products[row * stride..][..count])
     }
 
-    /// All products, those with the entries' vectors under the metric.
+    /// Computes all products; those with the entries' vectors are under the metric.
     #[inline(always)]
     fn multiply<S: Simd>(&mut self, simd: S, candidates: &[f32], len: usize, stride: usize) {
         let (samples, products) = (self.matrix.samples, &mut self.products);
@@ -79,7 +79,7 @@ impl PointDistance {
         combinations::combine(simd, of_entries, -1.0, entries, coordinates, stride);
     }
 
-    /// Lengths under the metric, and the factors that bring them to 1.
+    /// Computes the candidates' lengths under the metric, and the factors that bring them to 1.
     #[inline(always)]
     fn normalize(&mut self, squares: &[f32], stride: usize) {
         self.norms.clear();
@@ -94,7 +94,7 @@ impl PointDistance {
         self.scales.resize(stride, 0.0);
         let squares = squares.iter().chain(std::iter::repeat(&0.0));
         for ((norm, scale), square) in self.norms.iter_mut().zip(&mut self.scales).zip(squares) {
-            // A remainder that is only rounding counts as the background's mean.
+            // A candidate whose length is only rounding counts as the background's mean.
             (*norm, *scale) = match *norm > square * vector_ops::MIN_REMAINDER {
                 true => (1.0, 1.0 / norm.sqrt()),
                 false => (0.0, 0.0),

@@ -2,7 +2,7 @@
 //! background.
 //!
 //! As one of P + 1 columns of V (equation 2) a candidate hardly counts beside the history that it shares with all
-//! others. The entries of the bag are subspaces of several vectors as before, kept as [`Span`]s.
+//! others. The entries of the bag are subspaces of several vectors, as in the paper, kept as [`Span`]s.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +15,7 @@ use crate::features::quantized::QuantizedVector;
 use crate::grassmann::subspace::AffineSubspace;
 use crate::params::table::Params;
 
-/// The vectors that an entry is made of beside that of the box, when the first box's image is augmented.
+/// How many rotated copies an entry has at most beside the box's own vector, when the first box's image is augmented.
 const MAX_AUGMENTED: usize = 2;
 
 /// The bag (equation 3), the history, and the background, under whose metric vectors are compared.
@@ -90,7 +90,7 @@ impl AppearanceModel for SingleVector {
         Some(comparison.single_vector.query_products(count))
     }
 
-    /// Those of the vectors that the entries keep, under the plain metric.
+    /// The subspaces of the entries' templates, under the plain metric.
     fn subspaces(&self, params: &Params) -> Vec<AffineSubspace> {
         let entries = self.bag.entries.iter();
         entries.map(|entry| entry.subspace(params)).collect()

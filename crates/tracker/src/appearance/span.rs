@@ -1,10 +1,10 @@
 //! An affine subspace as coefficients of the templates that it is made of.
 //!
-//! The mean and the basis of equation 1 lie in the span of a few vectors, the templates, and a single-vector
-//! candidate is compared with them by inner products only. So they are never written out under the background's
+//! The mean and the basis of equation 1 lie in the span of a few vectors, the templates, and a single-vector candidate
+//! is compared with them by inner products only. So the mean and the basis are never written out under the background's
 //! metric: that metric gives the Gram matrix of the templates, whose eigenvectors give the coefficients. When the
-//! background changes, only small matrices change (see [`mahalanobis`](crate::appearance::mahalanobis) for
-//! the background coordinates).
+//! background changes, only small matrices change (see [`mahalanobis`](crate::appearance::mahalanobis) for the
+//! background coordinates).
 
 use pulp::{Arch, Simd};
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ use crate::params::table::Params;
 /// The mean, then the basis vectors, of an affine subspace. A snapshot carries the templates: the rest follows.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Span {
-    /// The vectors that it was made of.
+    /// The vectors that the subspace was made of.
     pub templates: Vec<QuantizedVector>,
     /// ‖μ‖².
     #[serde(skip)]

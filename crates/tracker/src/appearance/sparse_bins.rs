@@ -1,5 +1,5 @@
 //! A histogram as a snapshot has it: most colours are never seen, so each bin that is not empty comes with the number
-//! of empty ones before it. Bins have 8 significant bits: the upper half of a number holds them.
+//! of empty ones before it. Bins have 8 significant bits, so the upper half of an `f32` holds a bin.
 
 use serde::de::{Deserialize, Deserializer, Error};
 use serde::ser::{Serialize, Serializer};

@@ -5,7 +5,8 @@ use pulp::Simd;
 use crate::features::extractor::Grid;
 use crate::features::hog::channels::{CHANNELS, GRAY, LANES};
 
-/// Cells that a dense search goes beyond the window on each side at most: further costs more than the rest of a step.
+/// Cells that a dense search goes beyond the window on each side at most: a wider search would cost more than the rest
+/// of a step.
 pub(crate) const MAX_OFFSET: usize = 24;
 /// The channels after those of a cell: energies of all channels but the gray values, gray values and their squares,
 /// each summed over as many cells to the right as a window is wide.
@@ -16,7 +17,8 @@ const PLANES: usize = WIDE + WIDE_COUNT;
 /// The lines of a grid, those of a row of cells one after the other.
 #[derive(Debug, Default)]
 pub(crate) struct ChannelPlanes {
-    /// From one line to the next. A register may begin at any cell, so lines end with unused values.
+    /// The distance of the beginnings of two lines, in values. A register may begin at any cell, so lines end with
+    /// unused values.
     stride: usize,
     lines: Vec<f32>,
     /// The energies and squares of one row.

@@ -21,7 +21,7 @@ use crate::motion::particles::Particle;
 use crate::motion::search::{MAX_PRIOR_WIDTH, SearchContext};
 use crate::params::table::{Features, Params};
 
-/// Multiplications of a dense search at most: as many as [`MAX_OFFSET`] takes with 8 x 8 cells.
+/// Multiplications of a dense search at most: with 8 x 8 cells enough for 45 x 45 places.
 const MAX_PRODUCTS: usize = 1_600_000;
 
 /// The dense search of a frame, and its buffers.
@@ -31,7 +31,7 @@ pub(crate) struct DenseSearch {
     planes: ChannelPlanes,
     /// The logarithm of what the weight of a particle at each place is multiplied by, row by row.
     values: Vec<f32>,
-    /// Best first.
+    /// The local maxima, best first.
     pub maxima: Vec<Particle>,
 }
 

@@ -7,11 +7,11 @@ use crate::motion::random::normal;
 
 /// Standard deviation of the labels' bell, as a share of the box along x and y, and of the logarithm of the scale.
 const LABEL_WIDTH: f64 = 0.15;
-/// Areas around the first box that the discriminant starts from, and how far they are off: a third of them each of
-/// these shares of the box (standard deviations), so that near misses, misses and the surroundings are all known.
+/// The number of areas around the first box in the first fit, and the standard deviations of their offsets, as shares
+/// of the box; each holds for a third of the areas. So near misses, misses and the surroundings are all learned.
 const FIRST_AREAS: usize = 300;
 const FIRST_STDS: [f64; 3] = [0.1, 0.3, 0.8];
-/// The same for the logarithm of their scale, as a share of those.
+/// The standard deviation of the logarithm of an area's scale, as a share of that of its offset.
 const FIRST_SCALE_STD: f64 = 0.3;
 
 /// Makes `out` the labels of `areas`.

@@ -7,7 +7,7 @@
 //!
 //! w ← argmin  mean (w · uᵢ - yᵢ)² + damping · ‖w - w_before‖²
 //!
-//! So no sample is kept, and one frame changes w only so far. A few steps of conjugate gradients are enough: the
+//! So no sample is kept, and one frame changes w only a little. A few steps of conjugate gradients are enough: the
 //! damping makes the problem well conditioned. The unit vectors are never written out ([`TrainingSamples`]).
 
 use pulp::{Arch, Simd};
@@ -21,7 +21,7 @@ use crate::params::table::Params;
 const DAMPING: f64 = 0.3;
 /// Steps of conjugate gradients in a frame.
 const STEPS: usize = 5;
-/// Before the first frame nothing is known: it is fitted with this factor of the damping, in more steps.
+/// Before the first fit w is 0 and not worth keeping to: that fit has this multiple of the damping, and more steps.
 const FIRST_DAMPING: f64 = 0.1;
 const FIRST_STEPS: usize = 25;
 
@@ -40,7 +40,7 @@ pub(crate) struct Discriminant {
 /// Buffers for a fit.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
-    /// The labels, and then the residuals of the scores.
+    /// The labels; a fit turns them into the residuals of the scores.
     pub labels: Vec<f32>,
     gradient: Vec<f32>,
     direction: Vec<f32>,

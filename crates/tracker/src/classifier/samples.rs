@@ -16,10 +16,10 @@ const GROUP: usize = 8;
 /// The origin, and of each sample its scale and its score.
 #[derive(Debug, Default)]
 pub(crate) struct TrainingSamples {
-    /// The weights and the origin, as the vectors see them.
+    /// The discriminant's weights, and its origin with the vectors' mean subtracted.
     weights: Vec<f32>,
     origin: Vec<f32>,
-    /// One over the length of x - origin; 0 where there is none.
+    /// 1 / ‖x - origin‖; 0 where the length is only rounding.
     scales: Vec<f32>,
     /// About 1 on the target and 0 beside it, but not bounded.
     pub scores: Vec<f32>,
@@ -58,7 +58,7 @@ impl TrainingSamples {
         }
     }
 
-    /// As [`push_scores`](Self::push_scores), with the products made here.
+    /// As [`push_scores`](Self::push_scores), for `vectors` whose products and squares it computes.
     pub fn score_vectors(&mut self, vectors: &[f32]) {
         let len = self.weights.len();
         let count = vectors.len() / len;
@@ -82,7 +82,8 @@ impl TrainingSamples {
         self.scores.truncate(count);
     }
 
-    /// The vectors from the sample `first` on. At the end the last one stands more than once, and is not to be counted.
+    /// The vectors from the sample `first` on. In the last group the last vector fills the places that are left; the
+    /// caller does not count those.
     #[inline(always)]
     fn group<'a>(&self, first: usize, vectors: &'a [f32], len: usize) -> [&'a [f32]; GROUP] {
         let mut group = [vectors; GROUP];
@@ -92,7 +93,7 @@ impl TrainingSamples {
         group
     }
 
-    /// Σ (uᵢ · d)².
+    /// Σ (uᵢ · d)² over all samples, with d = `direction`.
     #[inline(always)]
     pub fn energy<S: Simd>(&self, simd: S, vectors: &[f32], direction: &[f32]) -> f32 {
         let (len, scales) = (direction.len(), &self.scales);

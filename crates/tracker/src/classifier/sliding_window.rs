@@ -56,7 +56,7 @@ pub(crate) fn window_scores_simd<S: Simd>(
 }
 
 /// The products of the windows from column `first` on in each of `rows`: with the weights and with the origin, of all
-/// channels but the gray one and then of that. Of windows that are not on the grid they mean nothing.
+/// channels but the gray one and then of the gray one. The products of windows that reach beyond the grid mean nothing.
 #[inline(always)]
 fn correlate<S: Simd>(
     simd: S,

@@ -36,9 +36,9 @@ impl Scorer {
         }
     }
 
-    /// The scores of windows, one a lane. `products` are those with the weights and with the origin: first of all
-    /// channels but the gray one, then of the gray values as they are on the grid. The rest are the windows' sums of
-    /// energies, gray values and squares of these.
+    /// The scores of windows, one a lane. `whole` are the windows' products with the weights and with the origin, over
+    /// all channels but the gray one; `grays` are these products of the gray values as they are on the grid. The last
+    /// argument is the windows' sums of energies, of gray values and of squares of gray values.
     #[inline(always)]
     pub fn score<S: Simd>(
         &self,

@@ -10,7 +10,7 @@ use crate::grassmann::subspace::{self, AffineSubspace, MAX_VECTORS};
 use crate::linalg::{gemm, jacobi};
 use crate::params::table::Params;
 
-/// n at most.
+/// The greatest n, the number of basis vectors.
 const MAX_DIM: usize = 6;
 /// Candidates that are compared together: more of the longest vectors would take many megabytes.
 const BATCH: usize = 128;
@@ -165,7 +165,7 @@ impl Evaluation {
     }
 }
 
-/// Appends the distances of a batch, with matrices of the paper's size or of the largest.
+/// Appends the distances of a batch, with matrices of the paper's sizes where these suffice, else of the largest sizes.
 #[pulp::with_simd(compare = Arch::new())]
 #[inline(always)]
 fn compare_simd<S: Simd>(_: S, evaluation: &mut Evaluation, vectors: usize, previous: usize) {
@@ -175,7 +175,8 @@ fn compare_simd<S: Simd>(_: S, evaluation: &mut Evaluation, vectors: usize, prev
     }
 }
 
-/// Appends the distances of a batch, by its products with so many `vectors` of the bag and `previous` patches.
+/// Appends the distances of a batch, from its inner products with the `vectors` means and basis vectors of the bag and
+/// with the `previous` patches.
 #[inline(always)]
 fn compare_as<const M: usize, const N: usize>(
     evaluation: &mut Evaluation,
@@ -187,7 +188,7 @@ fn compare_as<const M: usize, const N: usize>(
     let products = DMatrixView::from_slice(&evaluation.products, rows, columns);
     let patches = evaluation.patches.chunks_exact(len).enumerate();
     for (i, v) in patches.skip(previous) {
-        // Vᵀx of the x-th vector; zero beyond the columns of V, v and H.
+        // The products of V = [v, H] with vector `x` of the bag; zero beyond the columns of V.
         let with = |x: usize| {
             let mut column = SVector::<f64, M>::zeros();
             column[0] = products[(x, i)];

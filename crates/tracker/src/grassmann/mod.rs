@@ -12,7 +12,7 @@
 //! | the candidate's subspace | μ as its products, U as the coefficients W S⁻¹ | 1, 2 | `evaluation` |
 //! | principal angles | θ from the singular values of UᵀFₖ, an n × n matrix | 6, 7 | `principal_angles` |
 //! | distances | α γ ‖μ - μₖ‖² + (1 - α) β ‖Θ‖² | 4, 5, 8 | `evaluation` |
-//! | likelihoods, weights | the sum rule over the bag | 9 to 12 | `weights`, beside this room |
+//! | likelihoods, weights | the sum rule over the bag | 9 to 12 | `weights`, outside this module |
 //!
 //! **In:** N candidates and 1 to P previous patches, each of D values; K entries of up to n basis vectors each.
 //! **Out:** N × K distances in \[0, 1\], for the sum rule. Nothing has a unit: gray values are shares of white.

@@ -1,9 +1,9 @@
 //! The principal angles between two subspaces (equations 6 and 7).
 //!
-//! Their cosines are the singular values of EᵀF, so the squares of these are the eigenvalues of (EᵀF)ᵀ EᵀF. In double
-//! precision that leaves the smallest cosine off by 1e-8. There is one such matrix for each candidate and entry, a
-//! thousand a frame: nalgebra's `singular_values` takes five times as long, and stops early where singular values are
-//! small (dimforge/nalgebra issue 1172).
+//! Their cosines are the singular values of EᵀF, so the squares of these are the eigenvalues of (EᵀF)ᵀ EᵀF. Squaring
+//! costs half of the digits of double precision: a small cosine is off by up to 1e-8. There is one such matrix for each
+//! candidate and entry, a thousand a frame: nalgebra's `singular_values` takes five times as long, and stops early
+//! where singular values are small (dimforge/nalgebra issue 1172).
 
 use nalgebra::SMatrix;
 

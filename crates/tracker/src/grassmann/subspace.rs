@@ -8,7 +8,7 @@ use crate::linalg::jacobi;
 use crate::params::table::Params;
 
 /// A direction counts when its singular value is above this share of the largest. Below it, single-precision gray
-/// values say nothing: one gray step in one pixel of one of six patches is some 0.0001.
+/// values say nothing: one gray step in one pixel of one of six patches is some 0.0001 of the largest singular value.
 pub const RANK_TOLERANCE: f64 = 1e-5;
 
 /// The greatest difference of UᵀU from the identity that single precision leaves.
@@ -17,10 +17,10 @@ const ORTHONORMAL: f64 = 1e-3;
 /// The most vectors that a subspace is made of: P + 1.
 pub(crate) const MAX_VECTORS: usize = 11;
 
-/// The Gram matrix of up to [`MAX_VECTORS`] vectors, with zeros for those that there are not.
+/// The Gram matrix of up to [`MAX_VECTORS`] vectors; zero in the rows and columns beyond their number.
 pub(crate) type Gram = SMatrix<f64, MAX_VECTORS, MAX_VECTORS>;
 
-/// A number for each of them.
+/// A coefficient for each of up to [`MAX_VECTORS`] vectors.
 type Weights = SVector<f64, MAX_VECTORS>;
 
 /// An affine subspace A = {μ, U} (equation 1) of the space of feature vectors.
@@ -79,8 +79,8 @@ impl AffineSubspace {
     }
 }
 
-/// Makes `subspace` that [`of`](AffineSubspace::of) vectors of length `len`, one after the other, in its present
-/// memory.
+/// Makes `subspace` the subspace [`of`](AffineSubspace::of) `vectors`, each of length `len`, one after the other. The
+/// memory of `subspace` is reused.
 #[pulp::with_simd(fit = Arch::new())]
 #[inline(always)]
 pub(crate) fn fit_simd<S: Simd>(

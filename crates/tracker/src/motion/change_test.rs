@@ -2,7 +2,8 @@
 //!
 //! A target that comes to a place changes what is seen there. A place beside the last box that looks as it did before
 //! is background, however much it resembles the target. So a small image is kept of the frame in which the target was
-//! last seen, and for each particle the part of its box that lay beside the target then is correlated with it.
+//! last seen, and for each particle the present and the kept small image are correlated over the part of its box that
+//! lay beside the target.
 //!
 //! The test errs on the side of the particle: where light or camera changed the place, and where the last box covered
 //! it, it says nothing.
@@ -22,13 +23,13 @@ const CHANCE_CORRELATION: f64 = 0.4;
 /// Variance of noise, in squared gray values: added to that of each place.
 const NOISE: f64 = 10.0;
 
-/// The small images of the present frame and of the last one, compared.
+/// The small images of the present frame and of the frame in which the target was last seen, compared.
 #[derive(Debug, Default)]
 pub(crate) struct ChangeTest {
     /// The small image of the present frame.
     pub image: SmallImage,
     integral: JointIntegral,
-    /// Where the target was then, in pixels of the present small image; none where nothing is compared.
+    /// Where the target was last seen, in pixels of the present small image; none where nothing is compared.
     last_box: Option<Rect>,
 }
 
@@ -41,8 +42,8 @@ impl ChangeTest {
             .reserve(self.image.pixels.capacity() + self.image.width());
     }
 
-    /// Compares the small image with the last one, `radius` working pixels around the box of `displaced`, which is
-    /// where the last box would be had it moved with the image.
+    /// Compares the small image with that of `last`, up to `radius` working pixels around the box of `displaced`, which
+    /// is where the last box would be had it moved with the image.
     pub fn compare(
         &mut self,
         last: &LastSeen,
@@ -54,7 +55,7 @@ impl ChangeTest {
         let (cell, radius) = (CELL as f64, radius / CELL as f64);
         let [across, down] = [displaced.x - target.x, displaced.y - target.y]
             .map(|shift| (shift / cell).round() as isize);
-        // Where a pixel of now has one of then.
+        // The columns (or rows) of the present small image that the earlier one has too.
         let span = |from: f64, side: f64, now: Range<usize>, then: Range<usize>, shift: isize| {
             let first = ((from - radius).floor() as isize)
                 .max(now.start as isize)
@@ -105,8 +106,8 @@ impl ChangeTest {
         }
     }
 
-    /// How much of `area` lies beside the last box and looks as it did then, less as it looks less so: in \[0, 1\]; 0
-    /// where nothing is known.
+    /// The share of `area` that lies beside the last box, times the likeness of the two small images there: in \[0,
+    /// 1\]; 0 where too few pixels are compared.
     fn unchanged(&self, area: &Rect, last_box: &Rect) -> f64 {
         let (pixels, sums) = self.integral.over(area);
         let (covered, covered_sums) = self.integral.over(&area.intersection(last_box));

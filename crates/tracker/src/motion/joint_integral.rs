@@ -5,7 +5,8 @@ use pulp::{Arch, Simd};
 use crate::image::rect::Rect;
 use crate::linalg::scratch::clear_and_reserve;
 
-/// Sums over a rectangle: of the gray values now, then, of their squares, and of their products.
+/// Sums over a rectangle: of the gray values of the present image, of those of the earlier image, of the squares of
+/// each, and of the products of both.
 pub(crate) type Sums = [u32; 5];
 
 /// The sums over all rectangles of a part of the two images.
@@ -20,14 +21,14 @@ pub(crate) struct JointIntegral {
 }
 
 impl JointIntegral {
-    /// Forgets the last images, and makes room for a part of so many pixels and rows together.
+    /// Forgets the last images, and makes room for a part whose pixels and rows together are `count`.
     pub fn reserve(&mut self, count: usize) {
         // A corner more than pixels in each row, and one row more.
         clear_and_reserve(&mut self.sums, 2 * count + 1);
     }
 
-    /// Becomes the sums of the part that begins at `left` and `top`, whose rows of now and then are `rows`; at most 2¹⁶
-    /// pixels.
+    /// Becomes the sums of the part that begins at `left` and `top`, whose rows in the present and in the earlier image
+    /// are `rows`; at most 2¹⁶ pixels.
     pub fn compute<'a>(
         &mut self,
         (left, top): (usize, usize),
@@ -47,7 +48,7 @@ impl JointIntegral {
     /// The number of pixels of the part in `area`, whose edges count to the nearest pixel, and the sums over them.
     pub fn over(&self, area: &Rect) -> (u32, Sums) {
         let corner = |value: f64, first: usize, count: usize| {
-            // The conversion rounds down; rounding itself would be a call.
+            // Adding one half and truncating rounds to the nearest; `f64::round` would be a function call here.
             (value + 0.5 - first as f64).clamp(0.0, count as f64) as usize
         };
         let left = corner(area.x, self.left, self.columns);

@@ -1,7 +1,8 @@
 //! Draws of the search around the last answer, in two rounds.
 //!
-//! The first round starts at the last answer and, where the image moved, at where that moved to; half of it is drawn
-//! around the maxima of the dense search. The second round is drawn narrowly around the best of the first.
+//! The first round draws around the last answer and, where the image moved, around the last answer moved with it; up to
+//! half of the round is drawn around the maxima of the dense search. The second round is drawn narrowly around the best
+//! of the first.
 
 use rand_chacha::ChaCha8Rng;
 
@@ -10,7 +11,7 @@ use crate::motion::random::normal;
 use crate::motion::search::{REFINED_STD, SearchContext};
 use crate::params::table::Search;
 
-/// Particles drawn around each maximum: one of several is within a quarter of a cell.
+/// Particles drawn around each maximum: of so many, about one is within a quarter of a cell of it.
 const AROUND_MAXIMUM: usize = 6;
 /// Around how many of the best particles the second round is drawn.
 const MODES: usize = 5;
@@ -20,7 +21,8 @@ const REFINED_STD_SCALE: f64 = 0.01;
 /// exceeds the usual change of scale.
 const BLUR: f64 = 0.4;
 const REFINED_BLUR: f64 = 0.3;
-/// An answer is the mean of the particles this near to the most likely one, in working pixels: steadier than one.
+/// An answer is the mean of the particles this near to the most likely one, in working pixels: a mean is steadier than
+/// one particle.
 const AVERAGING_RADIUS: f64 = 3.0;
 
 impl SearchContext<'_> {
@@ -35,7 +37,7 @@ impl SearchContext<'_> {
     ) {
         out.clear();
         out.push(self.bounds.clamp(self.last));
-        // A search of one particle has no second.
+        // A search of one particle has no room for a second.
         if self.is_displaced() && self.params.particles > 1 {
             out.push(self.bounds.clamp(self.displaced()));
         }
@@ -63,8 +65,8 @@ impl SearchContext<'_> {
         }
     }
 
-    /// Appends the particles of the second round, around those of `particles` with the greatest `weights`. Whether
-    /// there is a second round.
+    /// Appends the particles of the second round, around those of `particles` with the greatest `weights`. Tells
+    /// whether there is a second round.
     pub fn refine(
         &self,
         weights: &[f64],
@@ -93,8 +95,8 @@ impl SearchContext<'_> {
         true
     }
 
-    /// The answer: the particle at `best` (equation 12) or, searching from the last answer, the weighted mean of those
-    /// around it, of scales the geometric one.
+    /// The answer: the particle at `best` (equation 12) or, searching from the last answer, the weighted mean of the
+    /// particles around it (of their scales the geometric mean).
     pub fn answer(&self, particles: &[Particle], weights: &[f64], best: usize) -> Particle {
         let center = particles[best];
         if self.params.search == Search::Resampled {
@@ -139,7 +141,7 @@ impl SearchContext<'_> {
     }
 }
 
-/// The indices of the greatest weights, greatest first, of equals the first first.
+/// Fills `out` with the indices of the greatest weights, greatest first; of equal weights the lower index first.
 fn greatest(weights: &[f64], out: &mut [usize]) {
     let precedes = |a: usize, b: usize| weights[b].total_cmp(&weights[a]).then(a.cmp(&b)).is_lt();
     for place in 0..out.len() {

@@ -1,5 +1,5 @@
-//! The paper's particle filter (section III-A): each frame draws N particles from the last ones with the probability of
-//! their weights, and moves each by a Gaussian step.
+//! The paper's particle filter (section III-A): each frame draws N of the last particles, each with the probability of
+//! its weight, and moves each draw by a Gaussian step.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -12,14 +12,14 @@ use crate::params::table::{Params, Search};
 /// The particles of a frame, with their weights.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Cloud {
-    /// N of them.
+    /// N particles.
     pub particles: Vec<Particle>,
-    /// One for each particle, at least 0, with the sum 1.
+    /// The weights, one for each particle; each at least 0, their sum 1.
     pub weights: Vec<f64>,
 }
 
 impl Cloud {
-    /// N particles at `place`, with equal weights; none where the next ones are not drawn from the last.
+    /// N particles at `place`, with equal weights; none where the search does not resample the last particles.
     pub fn at(place: Particle, params: &Params) -> Option<Self> {
         let count = params.particles as usize;
         (params.search == Search::Resampled).then(|| Self {
@@ -46,7 +46,7 @@ impl Cloud {
         out.clear();
         for _ in 0..params.particles {
             let draw = generator.random::<f64>() * total;
-            // Rounding can put the draw at the very end.
+            // Rounding can put the draw at the sum of all weights, beyond the last particle.
             let chosen = sums.partition_point(|&sum| sum <= draw);
             let origin = self.particles[chosen.min(self.particles.len() - 1)];
             let mut step = |std: f64| std * normal(generator);

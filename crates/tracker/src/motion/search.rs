@@ -6,7 +6,8 @@ use crate::params::table::{Params, Search};
 
 /// A displacement of the image below this, in working pixels, is within what a search covers anyway.
 const NOTABLE_DISPLACEMENT: f64 = 2.0;
-/// A wider search draws as many times more particles, up to this: a target is recognised from a third of its box away.
+/// A search that is k times as wide draws k times as many particles in its first round, k at most this: a target is
+/// recognised from a third of its box away.
 const MAX_DENSITY: f64 = 4.0;
 /// The share of the particles that are drawn in the second round, around the best of the first.
 const REFINED_SHARE: f64 = 0.5;
@@ -25,7 +26,8 @@ pub(crate) struct SearchContext<'a> {
     pub last: Particle,
     /// The displacement of the whole image, in working pixels of the rectified view.
     pub displacement: (f64, f64),
-    /// What makes a rotated target upright: particles are in the view that it makes. None where the target is upright.
+    /// The rotation that makes a rotated target upright; particles are in the view rotated so. None where the target is
+    /// upright.
     pub rotation: Option<Rotation>,
     /// How many times as wide as usual the search is: more than once while the target is lost.
     pub spread: f64,
@@ -72,7 +74,7 @@ impl SearchContext<'_> {
         (self.radius() + self.samples_radius).max(self.dense_radius())
     }
 
-    /// `particle` of the rectified view where it is in the frame.
+    /// `particle`, given in the rectified view, at its place in the frame.
     pub fn in_frame(&self, particle: Particle) -> Particle {
         self.rotation.map_or(particle, |rotation| {
             let (x, y) = rotation.to_original((particle.x, particle.y));
@@ -88,8 +90,8 @@ impl SearchContext<'_> {
         (all + more, first + more)
     }
 
-    /// The logarithm of the prior on the displacement of a particle: from the last answer, or from where that would be
-    /// had it moved with the image. The prior is `prior_width` times as wide as usual.
+    /// The logarithm of the prior on the displacement of a particle, from the last answer or from the last answer moved
+    /// with the image, whichever is nearer. The prior is `prior_width` times as wide as usual.
     #[inline(always)]
     pub fn log_prior(&self, particle: &Particle, prior_width: f64) -> f64 {
         if self.params.displacement_std <= 0.0 || self.params.search == Search::Resampled {
@@ -123,7 +125,7 @@ pub(crate) fn usual_counts(params: &Params) -> (usize, usize) {
 /// How many particles the widest search draws in all.
 pub(crate) fn max_count(params: &Params) -> usize {
     let (all, first) = usual_counts(params);
-    // The printed evaluation is for N candidates.
+    // The paper's evaluation takes N candidates.
     if params.search == Search::Resampled || !params.single_vector_candidate {
         return all;
     }

@@ -3,18 +3,19 @@
 
 use crate::params::table::{Params, ParamsError};
 
-/// N at most.
+/// The greatest N, the number of particles.
 const MAX_PARTICLES: usize = 1000;
 /// Numbers in the feature vectors of one frame's candidates, at most: N · D.
 const MAX_CANDIDATE_VALUES: usize = 1_100_000;
 /// Numbers that a session keeps, at most: those of the full bag and of the background.
 const MAX_KEPT_VALUES: usize = 1_000_000;
-/// Multiplications with the background in a frame, at most: its samples with all candidates, and with all vectors in
-/// the bag when it is refreshed.
+/// Multiplications with the background's samples in a frame, at most: those of all candidates and, in a frame that
+/// refreshes the samples, those of all vectors that the bag is made of.
 const MAX_BACKGROUND_PRODUCTS: usize = 110_000_000;
 
 impl Params {
-    /// The most particles with which these parameters, which are valid, would still be: no search draws more.
+    /// The most particles with which these parameters would still be valid; they must be valid as they are. No search
+    /// draws more particles.
     pub(crate) fn max_particles(&self) -> usize {
         let compared = MAX_BACKGROUND_PRODUCTS
             .checked_div(self.background_samples as usize * self.feature_len())
@@ -24,14 +25,14 @@ impl Params {
             .min(compared)
     }
 
-    /// The vectors that the entries of the full bag are made of.
+    /// The number of vectors that the entries of the full bag are made of.
     fn bag_vectors(&self) -> usize {
         self.bag_size as usize * (self.history as usize + 1)
     }
 
-    /// Bytes that a session with these parameters keeps at most: the vectors of the bag and its background, those that
-    /// the bag is made of, and what does not depend on the sizes. A value takes four bytes, or one where it is
-    /// quantised.
+    /// Bytes that a session with these parameters keeps at most: the means and basis vectors of the bag, the
+    /// background's samples, the vectors that the bag is made of, and a part that does not depend on the sizes. A value
+    /// takes four bytes, or one where it is quantised.
     pub fn session_bytes(&self) -> usize {
         let vectors = self.bag_size as usize * (self.basis_dim as usize + 1);
         let kept = vectors + self.background_samples as usize;
@@ -39,7 +40,7 @@ impl Params {
         (288 << 10) + self.feature_len() * (bytes * kept + self.bag_vectors())
     }
 
-    /// Checks what sizes cost together. No product overflows once each size is in its range.
+    /// Checks the products of sizes against their limits. Each size must be in its range, so that no product overflows.
     pub(crate) fn validate_products(&self) -> Result<(), ParamsError> {
         let len = self.feature_len();
         let (particles, samples) = (self.particles as usize, self.background_samples as usize);

@@ -4,7 +4,7 @@
 //! - `presets`: the paper's printed settings and the default.
 //! - `limits`: what several sizes may cost together.
 //!
-//! Nothing goes in but numbers. A parameter out of its range, or sizes that cost too much together, give a
+//! The input is numbers alone. A parameter out of its range, or sizes that cost too much together, give a
 //! [`ParamsError`](table::ParamsError) that names the parameter, its value and what is allowed.
 
 pub(crate) mod limits;

@@ -1,4 +1,4 @@
-//! Two sets of parameters: what the paper prints, and what holds the target.
+//! Two sets of parameters: the paper's, and the default, which loses the target less often.
 
 use serde::{Deserialize, Serialize};
 
@@ -65,14 +65,14 @@ const PAPER: Params = Params {
     seed: 0,
 };
 
-/// The paper's α, σ, n, K and W stay.
+/// The default. α, σ, n, K and W are the paper's.
 const ROBUST: Params = Params {
-    // With fewer, more seeds lose a target that is half covered for good.
+    // With fewer particles, more seeds lose a half-covered target for good.
     particles: 200,
     // Cells, not pixels.
     patch_width: 8,
     patch_height: 8,
-    // With the present vector, W of them: no vector is in two subspaces.
+    // A subspace is made of P + 1 = W vectors, so no vector is in two subspaces.
     history: 4,
     motion_std_x: 8.0,
     motion_std_y: 8.0,
@@ -87,14 +87,14 @@ const ROBUST: Params = Params {
     context: 1.2,
     background_samples: 64,
     displacement_std: 12.0,
-    // A frame of seventy frames ago still counts a third. With faster rates some runs lose the scale of a car.
+    // The weight of a frame falls to a third in seventy frames. With faster rates some runs lose the scale of a car.
     scale_learning_rate: 0.015,
     dense_maxima: 6,
-    // Half of what the discriminant can say: the change test is wrong about background that resembles the target.
+    // Well below the discriminant's weight: the change test is wrong about background that resembles the target.
     static_penalty: 6.0,
     global_motion: true,
     pinned_weight: 6.0,
-    // A head that nods, a bottle that is lifted. 5 to 15 perform alike.
+    // The tilt of a nodding head or of a lifted bottle. 5 to 15 degrees perform alike.
     augmentation_angle: 10.0,
     update_distance_ratio: 1.5,
     discriminant_weight: 20.0,

@@ -1,8 +1,8 @@
 //! The table of parameters. Validation, the command line's help and the OpenAPI schema are made from it.
 //!
-//! A preset owns the rest: its structure, and the weights of its extensions. Those are fields of [`Params`] too, so
-//! that an ablation can switch each of them off (`bagtrack-eval --set search=resampled`), but no rows of the table:
-//! users of the service choose between two measured trackers, and not among the thousands that their mixtures make.
+//! The other fields of [`Params`] are the preset's own: its structure, and the weights of its extensions. An ablation
+//! can switch each of them off (`bagtrack-eval --set search=resampled`), but they are no rows of the table: users of
+//! the service choose between two measured trackers, not among thousands of mixtures.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +10,7 @@ use crate::image::frame::FrameFormat;
 use crate::image::rect::Rect;
 use crate::image::resolution;
 
-/// The seeds of two targets in a row are so far apart: 2⁶⁴ over the golden ratio.
+/// The difference of the seeds of two consecutive targets: 2⁶⁴ over the golden ratio.
 const SEED_STEP: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// Values of a cell with [`Features::Gradients`]: nine directions, two of chroma and the gray value.
@@ -33,7 +33,7 @@ pub enum Search {
     /// From the last particles by their weights, as in the paper.
     Resampled,
     /// From the last answer. A likelihood that is nearly flat hardly selects among particles, so a resampled cloud
-    /// spreads; one that starts at the answer does not.
+    /// spreads; a cloud drawn around the answer does not.
     Answer,
 }
 
@@ -100,12 +100,13 @@ macro_rules! parameters {
             }
 
             /// Sets the parameter `name` of the table; [`validate`](Self::validate) checks its range. None where there
-            /// is no such parameter, or where `value` is not of its type: a whole number from 0 on, if it is one.
+            /// is no such parameter, where `value` is NaN, or where the field is a whole number and `value` is not one
+            /// that the field can hold.
             pub fn set(&mut self, name: &str, value: f64) -> Option<()> {
                 match name {
                     $(stringify!($name) => {
                         let set = value as $kind;
-                        // A conversion that changes the value is none.
+                        // A value that the conversion changes is not of the field's type.
                         self.$name = (set as f64 == value).then_some(set)?;
                     })*
                     _ => return None,
@@ -183,28 +184,28 @@ parameters! {
         /// candidate hardly counts beside the history that it shares with all others. Then n = 1 for the candidate, and
         /// its one principal angle is that between its vector and the entry's subspace. Off: false.
         single_vector_candidate: bool;
-        /// Weight of the mean chroma of a cell beside its gradients. With gradients, in colour. Off: 0.
+        /// Weight of the mean chroma of a cell beside its gradients. Used with gradients, in colour. Off: 0.
         chroma_weight: f64 [0 to 10];
         /// Weight of the colour histogram (of luma, without colour): the likelihood is multiplied by exp(weight · m),
         /// where m is the mean over the box of the probability that a pixel's colour is the target's, minus a half.
         /// Searching from the answer. Off: 0.
         histogram_weight: f64 [0 to 100];
-        /// The area that is described, as a multiple of the box on each side. The rim of a target tells where it ends.
-        /// Off: 1.
+        /// The sides of the area that is described, as a multiple of the box's. What surrounds a target tells where it
+        /// ends. Off: 1.
         context: f64 [0.5 to 3];
         /// Learning rate of the correlation filter that measures the scale along a pyramid of areas. Off: 0.
         scale_learning_rate: f64 [0 to 1];
-        /// How many local maxima of the discriminant's dense search particles are drawn around. With gradients.
+        /// Around how many local maxima of the discriminant's dense search particles are drawn. Used with gradients.
         /// Off: 0.
         dense_maxima: u32 [0 to 16];
-        /// Log-likelihood penalty of a particle whose box, where it lies beside the last one, looks as it did when the
-        /// target was last seen: nothing has come there. Off: 0.
+        /// Log-likelihood penalty of a particle whose box, outside the last one, looks as it did when the target was
+        /// last seen: the target has not come there. Off: 0.
         static_penalty: f64 [0 to 100];
         /// Whether the displacement of the whole image is measured, and half of the particles moved by it.
         /// Off: false.
         global_motion: bool;
-        /// The weight of the first box's subspace in the sum rule (equation 9); it never leaves the bag. Off: 0, an
-        /// entry as any other.
+        /// The weight of the first box's subspace in the sum rule (equation 9); this subspace never leaves the bag.
+        /// Off: 0, which makes it an entry as any other.
         pinned_weight: f64 [0 to 100];
         /// By how many degrees, either way, the first box's image is rotated to augment its subspace. Off: 0.
         augmentation_angle: f64 [0 to 90];
@@ -218,14 +219,14 @@ parameters! {
 }
 
 impl Params {
-    /// Whether a tracker may have an expert beside it: its score must be a probability, and its search begin at the
-    /// answer.
+    /// Whether a tracker with these parameters may have an expert: the tracker's score must be a probability, which
+    /// takes the discriminant, and its search must begin at the last answer.
     pub fn takes_expert(&self) -> bool {
         self.discriminant_weight > 0.0 && self.search == Search::Answer
     }
 
-    /// How a session sees frames of the size `source` (width and height, above 0) that starts with `target`, a box in
-    /// their pixels.
+    /// How a session sees frames of the size `source` (width and height in pixels, above 0). `target` is its first box,
+    /// in pixels of these frames.
     pub fn frame_format(&self, source: (u32, u32), target: &Rect) -> FrameFormat {
         FrameFormat {
             size: resolution::working_size(source, target, self.target_side),
@@ -233,8 +234,8 @@ impl Params {
         }
     }
 
-    /// The parameters of one of several targets that see the same frames, counted from 0: each has draws of its own,
-    /// and those of the first are these.
+    /// The parameters of target number `target`, from 0, of several in the same frames. Each target has a seed of its
+    /// own; target 0 has the seed of `self`.
     pub fn of_target(&self, target: usize) -> Self {
         let mut params = self.clone();
         params.seed = self
