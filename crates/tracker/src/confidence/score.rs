@@ -1,9 +1,10 @@
 //! How sure the tracker is of its answer.
 //!
-//! With a discriminant the score is a logistic function of four predictors that each say something else: the
+//! With a discriminant the score is a logistic function of four predictors that each say a different thing: the
 //! discriminant's score (is it the target at all), the distance to the bag's first subspace (does it look as the user
-//! saw it), the running mean of that distance, since misses last, and how much larger or smaller than the first box the
-//! answer is (does the box still fit). It estimates the chance that the box overlaps the target by half or more.
+//! saw it), the running mean of that distance, since a miss lasts for many frames, and how much larger or smaller than
+//! the first box the answer is (does the box still fit). It estimates the chance that the box overlaps the target by
+//! half or more.
 //!
 //! Without one, as in the preset `paper`, the score is **not calibrated**: it orders frames, but is no probability.
 //! The distance of the chosen candidate to the nearest entry of the bag is small while the target looks as it did,
@@ -23,7 +24,7 @@ pub const PREDICTORS: [&str; 4] = [
     "|ln scale|",
 ];
 
-/// The highest score of a target that is lost: nothing of it is in the box.
+/// The highest score of a lost target, whose box shows something else.
 const MAX_LOST: f64 = 0.1;
 
 /// A ratio at which the score is a half.
@@ -73,14 +74,14 @@ impl Evidence {
 pub struct ScoreModel {
     /// z where all predictors are 0.
     pub intercept: f64,
-    /// One for each of [`PREDICTORS`].
+    /// The coefficients, one for each of [`PREDICTORS`].
     pub coefficients: [f64; PREDICTORS.len()],
 }
 
 impl ScoreModel {
     /// The model that the tracker uses. Set by hand near a logistic regression on annotated videos, with more weight on
-    /// the discriminant than the regression gives it. `tools/fit_score.py` prints the regression, and how
-    /// both order the frames and hold as chances.
+    /// the discriminant than the regression gives it. `tools/fit_score.py` prints the regression, and how well the
+    /// scores of both models order the frames and hold as chances.
     pub const TRACKER: Self = Self {
         intercept: 4.4,
         coefficients: [4.8, -6.4, -6.4, -2.1],
@@ -108,8 +109,9 @@ pub(crate) struct DistanceBaseline {
 }
 
 impl DistanceBaseline {
-    /// The score in [0, 1] and the status of an answer; `lost` when the target is lost, `near` when it is as
-    /// near the first subspace as the update gate asks for. The frame counts for those to come if it was tracked.
+    /// The score in [0, 1] and the status of an answer; `lost` tells whether the target is lost, `near` whether it is
+    /// as near the first subspace as the update gate asks for. Without a discriminant a frame that is tracked enters
+    /// the running mean.
     pub fn judge(&mut self, evidence: &Evidence, lost: bool, near: bool) -> (f32, Status) {
         let Some(predictors) = evidence.predictors() else {
             return self.judge_distance(evidence.nearest_distance);

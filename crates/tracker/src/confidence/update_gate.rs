@@ -18,13 +18,14 @@ const WARM_UP: u64 = 20;
 /// typical of a patch that shares about half with the first.
 const INITIAL_MEAN: f64 = 0.25;
 const ALWAYS_ACCEPTED: f64 = 0.3;
-/// What the limit is multiplied by where there is colour, which keeps the distance of a target that turns steadier, and
-/// takes that of an occluder further.
+/// What the limit is multiplied by in colour: colour keeps the distance of a turning target steadier, and makes that of
+/// an occluder larger.
 const COLOR_STRICTNESS: f64 = 0.8;
-/// The least mean against which a target that was lost is recognised, also if it has hardly changed so far.
+/// The least mean against which a target that was lost is recognised: the mean of a target that has hardly changed so
+/// far would be stricter.
 const MIN_MEAN: f64 = 0.15;
-/// The least score of a frame that passes: right twice as often as wrong. A box that is half off would be learned as
-/// the target, and the next one would be further off.
+/// The least score of a frame that passes: its box is right twice as often as wrong. A box that is half off would be
+/// learned as the target, and the next box would be further off.
 const MIN_SCORE: f32 = 0.65;
 /// Below this score of the discriminant the target is lost: nothing is learned, and the search widens from frame to
 /// frame until the target is found again, unless the box is followed. The discriminant says 0.5 to 1 on the target, and
@@ -52,7 +53,7 @@ pub(crate) fn passes(score: f32, number: u64) -> bool {
 pub(crate) struct UpdateGate {
     /// The running mean.
     pub mean_distance: f64,
-    /// The last one; 0 before the first.
+    /// The last of these distances; 0 before the first.
     pub last_distance: f64,
 }
 
@@ -66,10 +67,11 @@ impl Default for UpdateGate {
 }
 
 impl UpdateGate {
-    /// Whether the best particle, with this score of the discriminant and this distance to the first subspace, is not
-    /// the target, which the last frame has lost or not; the search was `spread` times as wide as usual. A wide search
-    /// finds more that resembles the target a little, so a target that is found again needs a better score and a
-    /// recognised distance. Without a discriminant no target is lost.
+    /// Whether the target is lost: whether the best particle, with this score of the discriminant and this distance to
+    /// the first subspace, shows something else. `was_lost` tells whether the target was lost in the last frame; the
+    /// search was `spread` times as wide as usual. A wide search finds more that resembles the target a little, so a
+    /// target that is found again needs a better score and a recognised distance. Without a discriminant no target is
+    /// lost.
     pub fn is_lost(
         &self,
         score: Option<f32>,

@@ -2,23 +2,24 @@
 
 use crate::image::rect::Rect;
 
-/// Below this score of the filter the answer is the expert's.
+/// From this score on the filter is sure. Where the two disagree, the answer is the filter's if the filter is sure,
+/// else the expert's.
 const SURE: f32 = 0.9;
-/// From this overlap on the two agree.
+/// The two agree where their boxes overlap by more than this.
 const AGREEMENT: f64 = 0.4;
 /// The shares of the expert's box where the two agree and the filter is sure, and where it is not.
 const SHARE: f64 = 0.2;
 const SHARE_IN_DOUBT: f64 = 0.5;
 
-/// What one of the two says of a frame.
+/// What the filter or the expert says of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Voice {
-    /// In working pixels.
+    /// The box, in working pixels.
     pub target: Rect,
     pub score: f32,
 }
 
-/// The box of both, in working pixels.
+/// The box that both give together, in working pixels.
 pub(crate) fn fuse(filter: &Voice, expert: &Voice) -> Rect {
     let is_sure = filter.score >= SURE;
     let (answer, other) = (&filter.target, &expert.target);
@@ -36,8 +37,8 @@ pub(crate) fn fuse(filter: &Voice, expert: &Voice) -> Rect {
     )
 }
 
-/// The chance that the box of both overlaps the target by half or more: a logistic function of both scores and of how
-/// far they agree, near a regression on annotated videos.
+/// The chance that the fused box overlaps the target by half or more: a logistic function of both scores and of how far
+/// they agree, near a regression on annotated videos.
 pub(crate) fn score(filter: &Voice, expert: &Voice) -> f32 {
     let logit = |score: f32| {
         let chance = f64::from(score).clamp(0.001, 0.999);

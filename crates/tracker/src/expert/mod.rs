@@ -1,7 +1,7 @@
 //! A second opinion: a tracker of another kind, which fails on other frames than the particle filter.
 //!
-//! - `opinion`: the trait [`Expert`](opinion::Expert), and what one says of a frame.
-//! - `second_opinion`: what a session keeps of its expert, and where that looks next.
+//! - `opinion`: the trait [`Expert`](opinion::Expert), and what an expert says of a frame.
+//! - `second_opinion`: what a session keeps of its expert, and where the expert looks next.
 //! - `fusion`: the answer that both give together, and its score.
 //!
 //! In: a frame, the filter's answer and score, and the expert's template and place. Out: a box, a score, and whether

@@ -18,7 +18,7 @@ pub trait Expert: fmt::Debug + Send + Sync {
     /// How many numbers a template has.
     fn template_len(&self) -> usize;
 
-    /// What `frame` shows in the box `target`: [`template_len`](Self::template_len) finite numbers.
+    /// The template of what `frame` shows in the box `target`: [`template_len`](Self::template_len) finite numbers.
     fn start(&self, frame: &Frame, target: &Rect) -> Vec<f32>;
 
     /// Where the target of `template` is in `frame`, if it is near `place`, the box that it had before.
@@ -30,12 +30,12 @@ pub trait Expert: fmt::Debug + Send + Sync {
     }
 }
 
-/// Below this score of the filter an expert is asked that is asked in doubt alone.
+/// Below this score of the filter [`InDoubt`] asks its expert.
 const IN_DOUBT: f32 = 0.95;
-/// Tells an expert that is asked in doubt alone from the same one that is always asked.
+/// Makes the fingerprint of [`InDoubt`] another than that of its expert.
 const IN_DOUBT_FINGERPRINT: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// An expert that is asked only of frames in which the filter's score is below 0.95. In the others the answer and the
+/// An expert that is asked only of frames in which the filter's score is below 0.95. In other frames the answer and the
 /// score are the filter's, and a frame costs no more than without an expert.
 #[derive(Debug, Clone)]
 pub struct InDoubt(pub Arc<dyn Expert>);
@@ -65,7 +65,7 @@ impl Expert for InDoubt {
 /// Where an expert sees the target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sighting {
-    /// The box.
+    /// The box, in pixels of the frame's luma.
     pub target: Rect,
     /// How sure the expert is, in [0, 1]. What is usual differs from expert to expert.
     pub score: f32,

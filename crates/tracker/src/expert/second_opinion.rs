@@ -1,4 +1,4 @@
-//! What a session keeps of its expert, and where that looks next.
+//! What a session keeps of its expert, and where the expert looks next.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ use crate::image::rect::Rect;
 const SURE: f32 = 0.95;
 /// Below this score the expert is not sure.
 const UNSURE_EXPERT: f32 = 0.5;
-/// An overlap of boxes that are apart, and for how many frames they may be.
+/// Boxes that overlap less than this are apart; the number is for how many frames in a row they may be.
 const APART: f64 = 0.1;
 const MAX_FRAMES_APART: u32 = 15;
 /// Below this score the filter doubts its answer, and after so many frames it goes on from the expert's place.
@@ -19,9 +19,10 @@ const DOUBTED: f32 = 0.5;
 const MAX_FRAMES_DOUBTED: u32 = 5;
 /// The expert's box settles in so many looks at the first frame.
 const FIRST_LOOKS: usize = 5;
-/// An expert that makes the first box larger or smaller than this has not seen it.
+/// The most by which an expert's box is taken to be larger or smaller than the target's, as a factor: an expert that is
+/// off by more has not seen the first box.
 const MAX_BIAS: f64 = 1.5;
-/// How far sides and places may be from those of a frame, in its sides.
+/// The bound of the coordinates and sides of the expert's box, in longer sides of the frame.
 const MAX_SIDES: f64 = 8.0;
 
 /// An expert's part of a session's state.
@@ -32,7 +33,7 @@ pub(crate) struct SecondOpinion {
     template: Vec<f32>,
     /// The expert's last box, in working pixels.
     place: Rect,
-    /// The expert's width and height of the first box, by those of the box.
+    /// The width and height that the expert saw of the first box, divided by those of the first box.
     bias: (f64, f64),
     frames_apart: u32,
     frames_doubted: u32,
@@ -43,11 +44,11 @@ pub(crate) struct SecondOpinion {
 /// What comes of asking the expert.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Consultation {
-    /// The box of both, in working pixels.
+    /// The box that the filter and the expert give together, in working pixels.
     pub target: Rect,
     /// The chance that this box overlaps the target by half or more.
     pub score: f32,
-    /// Where the filter goes on, if not from its own answer.
+    /// The centre, in working pixels, from which the filter goes on; none where it goes on from its own answer.
     pub moved: Option<(f64, f64)>,
 }
 
@@ -78,7 +79,7 @@ impl SecondOpinion {
         opinion
     }
 
-    /// Puts the expert to a box without bias.
+    /// Makes the expert look next at the box `target`, which is without the expert's bias.
     fn put(&mut self, target: &Rect, frame: &Frame) {
         let ((x, y), (horizontal, vertical)) = (target.center(), self.bias);
         let (width, height) = (f64::from(frame.width()), f64::from(frame.height()));
@@ -91,7 +92,8 @@ impl SecondOpinion {
         );
     }
 
-    /// Asks `expert` about `frame`, of which the filter says `filter`.
+    /// Asks `expert` about `frame` and fuses what it sees with `filter`, the filter's answer. A filter that is sure
+    /// enough is followed without asking.
     pub fn consult(
         &mut self,
         expert: &dyn Expert,
@@ -145,7 +147,7 @@ impl SecondOpinion {
         }
     }
 
-    /// The filter's own answer, to which the expert's box is put.
+    /// The filter's own answer, at which the expert looks next.
     fn follow(&mut self, frame: &Frame, filter: &Voice, filter_lost: bool) -> Consultation {
         self.put(&filter.target, frame);
         (self.frames_apart, self.frames_doubted) = (0, 0);

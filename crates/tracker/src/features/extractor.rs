@@ -24,11 +24,11 @@ pub(crate) const PYRAMID_MARGIN: f64 = 1.271_249_150_321_404_7;
 #[derive(Debug, Default)]
 pub(crate) struct Extractor {
     gray: GrayPatches,
-    /// Working pixels along a side of one of the frame's pixels.
+    /// The side of one of the frame's pixels, in working pixels.
     downsample: f64,
     integral: IntegralChannels,
     hog: HogCells,
-    /// For grids, which have other numbers of cells.
+    /// The cells of grids, which have other numbers of cells than particles.
     grid_hog: HogCells,
 }
 
@@ -43,8 +43,8 @@ pub(crate) struct Grid {
 }
 
 impl Extractor {
-    /// The window (working pixels) that holds the areas of `particles`, at least one, and of all others within `radius`
-    /// working pixels of one of these that are larger than the largest by at most [`SCALE_MARGIN`].
+    /// The window, in working pixels, that holds the areas of `particles` (at least one), and those of all particles
+    /// within `radius` working pixels of them whose scale is at most [`SCALE_MARGIN`] times the largest.
     pub fn window(
         particles: &[Particle],
         radius: f64,

@@ -15,8 +15,8 @@ const MAX_CELLS: usize = 64;
 /// Cuts the patches of many areas out of one frame; keeps its buffer.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct GrayPatches {
-    /// What is between two rows of pixels, at the height of a row of cells. Pixels are brought together along y once
-    /// for all cells of a row: half of the work of four pixels a cell.
+    /// A row of pixels at the height of a row of cells, interpolated between two rows of the frame. To interpolate
+    /// along y once for all cells of a row is half of the work.
     between: Vec<f32>,
 }
 
@@ -87,7 +87,8 @@ fn interpolate(first: f32, second: f32, share: f32) -> f32 {
     first + (second - first) * share
 }
 
-/// The centres of `count` cells over `[start, start + extent)`, among `pixels` pixels whose own centres are at a half.
+/// The centres of `count` cells over `[start, start + extent)`, among `pixels` pixels whose own centres are at 0.5, 1.5
+/// and so on.
 #[inline(always)]
 fn centers(start: f64, extent: f64, count: u32, pixels: u32) -> Centers {
     let mut centers = Centers {

@@ -8,12 +8,12 @@
 //! |---|---|---|
 //! | [`gray`] | gray patches | paper |
 //! | [`extractor`] | [`Extractor`](extractor::Extractor): from particles to vectors of either kind | ours |
-//! | [`hog`] | gradient histograms, a room of its own | ours |
+//! | [`hog`] | gradient histograms, a module of its own | ours |
 //! | [`quantized`] | vectors in 4 or 10 bits a value, as the state keeps them | ours |
 //!
 //! What can go wrong: nothing fails. Areas need finite positions and sides above 0. They may reach over the frame's
-//! edge: gray patches continue the edge's pixels; in gradient histograms there is no gradient beyond the edge, and
-//! black. Areas outside the window that was computed for the frame are treated as if the frame ended there.
+//! edge: gray patches continue the edge's pixels; in gradient histograms the pixels beyond the edge are black and have
+//! no gradient. Areas outside the window that was computed for the frame are treated as if the frame ended there.
 
 pub(crate) mod extractor;
 pub(crate) mod gray;

@@ -15,7 +15,7 @@ use crate::linalg::fixed_point::{self, FromBits};
 pub(crate) trait Level:
     Copy + Default + FromBits + Into<f32> + Serialize + DeserializeOwned
 {
-    /// The largest one.
+    /// The largest value.
     const MAX: f32;
     /// Writes values to a snapshot.
     fn serialize_all<S: Serializer>(values: &[Self], serializer: S) -> Result<S::Ok, S::Error> {
@@ -27,14 +27,14 @@ pub(crate) trait Level:
     }
 }
 
-/// No level: the second half of the last byte where the number of values is odd.
+/// Not a value: stands in the second half of the last byte where the number of values is odd.
 const NONE: i8 = -8;
 
 impl Level for i8 {
     const MAX: f32 = 7.0;
-    /// Two in a byte.
+    /// Writes two values in a byte.
     fn serialize_all<S: Serializer>(values: &[i8], serializer: S) -> Result<S::Ok, S::Error> {
-        // A pair as one number of 16 bits: so the compiler takes many at once.
+        // A pair is read as one number of 16 bits, so that the loop vectorises.
         let byte = |pair: [i8; 2]| {
             let pair = u16::from_le_bytes(pair.map(|value| value as u8));
             (pair & 0xF | pair >> 4 & 0xF0) as u8
@@ -42,7 +42,7 @@ impl Level for i8 {
         let (pairs, rest) = values.as_chunks();
         let mut bytes: Vec<u8> = pairs.iter().map(|&pair| byte(pair)).collect();
         bytes.extend(rest.iter().map(|&last| byte([last, NONE])));
-        // As a list of bytes, but not byte by byte.
+        // As one byte string; serde would write a vector element by element.
         serializer.serialize_bytes(&bytes)
     }
     fn deserialize_all<'de, D: Deserializer<'de>>(source: D) -> Result<Vec<i8>, D::Error> {
@@ -50,7 +50,7 @@ impl Level for i8 {
     }
 }
 
-/// Takes bytes of two values each.
+/// Reads bytes that hold two values each.
 struct Pairs;
 
 impl Visitor<'_> for Pairs {

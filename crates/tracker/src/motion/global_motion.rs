@@ -1,8 +1,8 @@
 //! The displacement of the whole image between two frames, as of a camera that pans.
 //!
 //! The mean gray values of columns and of rows are two short profiles of a frame. The displacement at which this
-//! frame's profile fits the last one best is that of the image. A profile that fits hardly better displaced than not
-//! says nothing: a large target that moves, or a new scene.
+//! frame's profile fits the last frame's best is that of the image. Where the profile fits hardly better displaced than
+//! in place, the displacement counts as 0: a large target moves, or the scene is new.
 
 use pulp::{Arch, Simd};
 use serde::{Deserialize, Serialize};
@@ -11,14 +11,14 @@ use crate::image::frame::Frame;
 
 /// The greatest displacement looked for, in working pixels.
 const RADIUS: usize = 48;
-/// A displacement must have less than this share of the misfit of none.
+/// The misfit of a displacement must be less than this share of the misfit without displacement.
 const MAX_MISFIT: f32 = 0.7;
-/// All pixels count of a frame whose longer side has less than twice as many, every second of one with less than three
-/// times as many, and so on.
+/// Of a frame whose longer side is k times this (k rounded down), every k-th row and every k-th part of a row count.
 const MAX_ALL: usize = 320;
 /// Parts of a sum, so that the loops vectorise.
 const PARTS: usize = 32;
-/// Finer differences are noise, which no snapshot can compress.
+/// Mean gray values are rounded to so many parts of a gray level: finer differences are noise, which no snapshot can
+/// compress.
 const PARTS_OF_GRAY: f32 = 16.0;
 
 /// The profiles of a frame.
@@ -113,7 +113,7 @@ fn best_displacement_simd<S: Simd>(_: S, before: &[f32], after: &[f32]) -> f64 {
     }
 }
 
-/// The mean absolute difference of two profiles, but for the mean difference, which is a change of the light.
+/// The mean absolute difference of two profiles, less their mean difference, which is a change of the light.
 #[inline(always)]
 fn misfit(after: &[f32], before: &[f32]) -> f32 {
     let light = mean_of_differences(after, before, |difference| difference);

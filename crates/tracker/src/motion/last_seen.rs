@@ -10,8 +10,8 @@ use crate::image::rect::Rect;
 use crate::linalg::scratch::clear_and_reserve;
 use crate::motion::particles::{Particle, StateBounds};
 
-/// Working pixels, along x and along y, that are one of the small image: noise is averaged away, and a small target
-/// still has some.
+/// The side of a pixel of the small image, in working pixels: large enough to average noise away, small enough for a
+/// small target to have some pixels.
 pub(crate) const CELL: usize = 4;
 
 /// What is further from the last box than this, in working pixels, is left out.
@@ -28,12 +28,12 @@ pub(crate) struct SmallImage {
     #[serde(serialize_with = "as_bytes")]
     pub pixels: Vec<u8>,
     width: u32,
-    /// The first column and row, in pixels of this size.
+    /// The first column and row, in pixels of the small image.
     left: u32,
     top: u32,
 }
 
-/// As a list of bytes, but not byte by byte.
+/// Writes the pixels as one byte string; serde would write a vector element by element.
 fn as_bytes<S: Serializer>(pixels: &[u8], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_bytes(pixels)
 }
@@ -102,7 +102,8 @@ impl LastSeen {
         self.target = Some(target);
     }
 
-    /// Whether this may be what a tracker of working images of this size has last seen, if it keeps that.
+    /// Whether this may be what a tracker of working images of this size has last seen; `is_kept` tells whether it
+    /// keeps that.
     pub fn is_valid_for(&self, (width, height): (u32, u32), is_kept: bool) -> bool {
         let (columns, rows) = (width as usize / CELL, height as usize / CELL);
         let (of_columns, of_rows) = self.image.part();

@@ -1,7 +1,7 @@
 //! The target's in-plane rotation, against the first frame.
 //!
-//! A head tilts, a rider leans. Boxes do not rotate, so an upright one slides along the target to where edges still
-//! fit. So the image is rotated back ([`Rotation`]), and everything else sees the target upright.
+//! A head tilts, a rider leans. Boxes do not rotate, so an upright box slides along a tilted target to where edges
+//! still fit. Therefore the image is rotated back ([`Rotation`]), and everything else sees the target upright.
 //!
 //! The angle is measured in frames that the models are updated from: the answer is compared once more in images rotated
 //! a step further either way, and weighed as particles are. The bag's first subspace does not rotate along, so the
@@ -23,7 +23,7 @@ pub(crate) const HYPOTHESES: usize = 2;
 const STEP: f64 = 6.0;
 /// The share of a measured change that is applied, so that noise evens out.
 const GAIN: f64 = 0.5;
-/// σ of the likelihood of an angle, as a multiple of that of a place: limbs that move make small rotations likely.
+/// σ of the likelihood of an angle, as a multiple of that of a place: moving limbs look like small rotations.
 const SIGMA_FACTOR: f64 = 3.0;
 /// Standard deviation of the prior on the angle, in degrees: targets are upright rather than not.
 const PRIOR_STD: f64 = 25.0;
@@ -31,11 +31,12 @@ const PRIOR_STD: f64 = 25.0;
 const MIN_ANGLE: f64 = 8.0;
 /// Below this angle, in degrees, a target stands upright: one measurement alone turns it by less.
 const UPRIGHT: f64 = 4.0;
-/// An angle is measured only where the distance to the first subspace is below this: a target half covered is nearer to
-/// it at some angle by chance.
+/// An angle is measured only where the distance to the first subspace is below this: a half-covered target is by chance
+/// nearer to that subspace at some angle.
 const MAX_DISTANCE: f64 = 0.25;
 
-/// Whether rotations are looked for. In the paper's V former frames would be upright.
+/// Whether rotations are looked for. They are not with the paper's V (equation 2), whose previous patches would stay
+/// upright.
 pub(crate) fn is_on(params: &Params) -> bool {
     params.single_vector_candidate && params.search == Search::Answer
 }

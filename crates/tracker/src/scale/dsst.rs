@@ -2,8 +2,8 @@
 //! 2014.
 //!
 //! Particles estimate the scale poorly: areas a few percent larger or smaller look nearly alike, and their rim shows
-//! the background, which grows as the camera approaches whatever the target does. A correlation filter along the scale,
-//! over a pyramid of areas of the box alone, is more exact:
+//! the background, which grows as the camera approaches even if the target does not. A correlation filter along the
+//! scale, over a pyramid of areas of the box alone, is more exact:
 //!
 //! y = F⁻¹(Σ conj(Aᵢ) Zᵢ / (B + λ)),  Aᵢ ← (1 - η) Aᵢ + η conj(G) Fᵢ,  B ← (1 - η) B + η Σ |Fᵢ|²
 //!

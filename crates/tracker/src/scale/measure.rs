@@ -14,16 +14,16 @@ const MAX_CHANGE: f64 = 0.06;
 const GAIN: f64 = 0.75;
 /// √(width · height) in working pixels of a target whose measured scale counts as much as that of the particles.
 const HALF_RELIANCE: f64 = 16.0;
-/// Maxima of the response of which none of the change is applied, and from which on all of it.
+/// Up to the first height of the maximum none of the change is applied, from the second on all of it.
 pub(crate) const MIN_RESPONSE: f64 = 0.3;
 pub(crate) const FULL_RESPONSE: f64 = 0.6;
 
 /// The maximum of the filter's response.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Maximum {
-    /// The logarithm of the scale there against that of the pyramid's middle.
+    /// The logarithm of the scale at the maximum, against that of the pyramid's middle.
     pub change: f64,
-    /// y there.
+    /// The response y at the maximum.
     pub response: f64,
 }
 
@@ -48,7 +48,7 @@ impl State {
         if !self.scale_filter.has_learned() {
             return self.bounds.clamp(found);
         }
-        // A target that was lost may have come nearer.
+        // A target that was lost may have come nearer, so its last scale does not count.
         let of_last = match self.frames_lost {
             0 => reliance(self.bounds.side(&self.answer)),
             _ => 0.0,

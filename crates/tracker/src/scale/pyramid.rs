@@ -15,13 +15,13 @@ use crate::linalg::{combinations, vector_ops};
 use crate::motion::particles::{Particle, StateBounds};
 use crate::params::table::Params;
 
-/// Areas of a pyramid, and the logarithm of the ratio of two neighbours: from 1 / 1.27 to 1.27, several times what a
-/// target changes between frames.
+/// Areas of a pyramid, and the logarithm of the ratio of two neighbouring sizes: from 1 / 1.27 to 1.27 times the
+/// middle, several times what a target changes between frames.
 pub(crate) const LEVELS: usize = 17;
 pub(crate) const STEP: f64 = 0.03;
 pub(crate) const MIDDLE: usize = LEVELS / 2;
 /// The lowest frequencies, which make the filter: the others of a real signal of that length add less than a hundredth
-/// to the response, since the desired one has next to nothing of them.
+/// to the response, since the desired response has next to nothing of those frequencies.
 pub(crate) const FREQUENCIES: usize = 5;
 /// Cells along a side of an area. Fewer describe the inside of a target too coarsely.
 const CELLS: u32 = 8;

@@ -70,7 +70,8 @@ pub(crate) fn sum_row<S: Simd, const SPACING: usize, const IS_FIRST: bool>(
                     sum = simd.mul_add_e_f32s(cb_shares[register], cb, sum);
                     sum = simd.mul_add_e_f32s(cr_shares[register], cr, sum);
                 }
-                // Twice the maximum of the share and 0: WebAssembly has no quick maximum. Both factors are exact.
+                // Twice max(share, 0), as WebAssembly has no quick maximum. The half of `half_strengths` undoes the
+                // factor; both are exact.
                 let share = simd.add_f32s(share, simd.abs_f32s(share));
                 let half_strength = simd.splat_f32s(half_strengths[i]);
                 sum = simd.mul_add_e_f32s(share, half_strength, sum);

@@ -2,7 +2,7 @@
 //!
 //! The energy of a cell is the sum of the squares of its directions. A cell is divided by three times the root of the
 //! mean energy of the 3 x 3 cells around it, which takes local contrast out. At the rim of the area the mean is over
-//! the cells that there are.
+//! those of the nine cells that exist.
 
 use pulp::Simd;
 
@@ -61,7 +61,7 @@ impl BlockNorm {
         }
     }
 
-    /// Adds to each energy those above and below it. All energies are set before.
+    /// Adds to each energy those above and below it. All energies must have been set.
     #[inline(always)]
     pub fn sum_vertically(&mut self) {
         let (columns, last) = (self.columns, self.row_weights.len() - 1);

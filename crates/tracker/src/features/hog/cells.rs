@@ -53,14 +53,14 @@ pub(crate) struct HogCells {
 }
 
 impl HogCells {
-    /// Makes room for up to so many columns and rows of cells, for areas of different numbers of them.
+    /// Makes room for areas of up to `columns` x `rows` cells.
     pub fn reserve(&mut self, columns: usize, rows: usize) {
         if self.cells.capacity() < columns * rows {
             self.resize(columns, rows);
         }
     }
 
-    /// Makes it so many columns and rows of cells.
+    /// Changes the numbers of columns and rows of cells.
     pub fn resize(&mut self, columns: usize, rows: usize) {
         if (self.columns, self.rows) == (columns, rows) {
             return;

@@ -24,7 +24,7 @@ pub(crate) const GRAY_WEIGHT: f32 = 0.3;
 /// counts, and a vivid one does not outweigh everything else.
 pub(crate) const HALF_CHROMA: f32 = 20.0;
 
-/// The channels, with the zeros after them.
+/// The number of channels with the zeros that pad them.
 pub(crate) const LANES: usize = 16;
 
 /// The channels of a point or a cell in a cache line.

@@ -23,7 +23,7 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// That of a candidate.
+    /// The layout of a candidate's cells.
     pub fn of(params: &Params) -> Self {
         Self {
             columns: params.patch_width as usize,
@@ -34,7 +34,7 @@ impl Layout {
 }
 
 /// Writes the feature vectors of `areas` (pixels of the frame, sides above 0, in the window of `integral`) to `out`:
-/// `columns * rows * CHANNELS` values each. `cells` has the last one's cells then.
+/// `columns * rows * CHANNELS` values each. Afterwards `cells` has the last area's cells.
 #[pulp::with_simd(describe = Arch::new())]
 #[inline(always)]
 pub(crate) fn describe_simd<S: Simd, A: Iterator<Item = Rect>>(

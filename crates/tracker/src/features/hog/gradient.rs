@@ -12,16 +12,17 @@ use crate::image::ycbcr::NEUTRAL;
 pub(crate) struct GradientRow {
     /// The unsigned direction of each pixel's gradient, in bins: 0 to [`DIRECTIONS`] for 0 to 180 degrees.
     pub bins: Vec<f32>,
-    /// Half of their lengths, in gray levels: 0 to 255 / √2.
+    /// Half of the length of each pixel's gradient, in gray levels: 0 to 255 / √2.
     pub half_strengths: Vec<f32>,
-    /// The gray values minus an offset, after that of the pixel before the row.
+    /// The gray values minus an offset; the first is that of the pixel left of the row.
     pub gray: Vec<f32>,
-    /// Cb and Cr minus that of gray, compressed: in units of [`HALF_CHROMA`], -1 to 1.
+    /// Cb and Cr minus those of gray, compressed to -1 to 1: ±1/2 at [`HALF_CHROMA`].
     pub chroma: [Vec<f32>; 2],
 }
 
 impl GradientRow {
-    /// Takes the chroma of `pixels` in row `y`, which is that of two rows of luma; then zeros up to `padded` pixels.
+    /// Takes the chroma of `pixels` in row `y`; a row of chroma serves two rows of luma. Zeros follow up to `padded`
+    /// pixels.
     #[inline(always)]
     pub fn take_chroma(&mut self, frame: &Frame, pixels: Range<usize>, y: usize, padded: usize) {
         for (channel, out) in self.chroma.iter_mut().enumerate() {

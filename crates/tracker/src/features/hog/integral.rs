@@ -22,8 +22,8 @@ use crate::features::hog::sample_coords::{SampleCoord, SampleCoords};
 use crate::image::frame::Frame;
 use crate::image::rect::Rect;
 
-/// Cells of at least this many pixels a side have a corner at every second pixel. They lose nothing by it, and a large
-/// target takes a quarter of the memory.
+/// Cells of at least this many pixels a side have a corner at every second pixel. Such cells lose no accuracy by it,
+/// and a large target takes a quarter of the memory.
 const MIN_COARSE_CELL: f64 = 8.0;
 
 /// The sums of the channels over all pixels of a window above and left of each *corner* of a grid.
@@ -32,7 +32,7 @@ pub(crate) struct IntegralChannels {
     /// The window along x and along y.
     pub x: Axis,
     pub y: Axis,
-    /// `(y.corners + 1) * (x.corners + 1)` sums, row by row. May be longer.
+    /// `(y.corners + 1) * (x.corners + 1)` sums, row by row. The vector may be longer.
     sums: Vec<Lanes>,
     /// The mean gray value of the window, rounded down: subtracted from every gray value.
     pub mean_gray: f32,
@@ -63,7 +63,7 @@ impl IntegralChannels {
         sum_window(self, frame);
     }
 
-    /// The sums along a row.
+    /// The two rows of corners around coordinate `y`.
     #[inline(always)]
     pub fn row(&self, y: SampleCoord) -> IntegralRow<'_> {
         let stride = self.x.corners + 1;

@@ -6,7 +6,7 @@
 //! Read [`gradient`], [`binning`] and [`integral`] (once a frame), then [`cells`], [`block_norm`] and [`descriptor`]
 //! (for each area). [`channels`] has the order of a cell's values.
 //!
-//! What can go wrong: nothing fails. Outside the window there is no gradient, and black.
+//! What can go wrong: nothing fails. Pixels outside the window are black and have no gradient.
 
 pub(crate) mod binning;
 pub(crate) mod block_norm;
