@@ -1,4 +1,4 @@
-//! The bag for people: each entry as its subspace, and each vector of it as pictures.
+//! The bag for people to look at: each entry as its subspace, and each vector of a subspace as pictures.
 
 use crate::features::hog::channels::{CHANNELS, CHROMA, DIRECTIONS, GRAY};
 use crate::grassmann::subspace::AffineSubspace;
@@ -29,7 +29,7 @@ pub struct VectorView {
 }
 
 impl BagEntry {
-    /// Of an entry of a tracker with `params`.
+    /// The view of `subspace`, an entry of a tracker with `params`.
     pub(crate) fn of(subspace: &AffineSubspace, params: &Params) -> Self {
         Self {
             mean: VectorView::of(&subspace.mean, params),

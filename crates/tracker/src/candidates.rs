@@ -1,7 +1,7 @@
 //! The candidates of a frame: its particles and, particle by particle, what is computed of them.
 //!
-//! They are described (B), compared with the bag (D) and weighed (equations 9 to 12), in this order, in one or more
-//! rounds: each call works on the particles that were added since the last one.
+//! The particles are described (B), compared with the bag (D) and weighed (equations 9 to 12), in this order, in one or
+//! more rounds: each call works on the particles that were added since the last one.
 
 use std::ops::Range;
 
@@ -65,9 +65,9 @@ pub(crate) struct Candidates {
     vectors: AlignedBuffer<f32>,
     /// D.
     len: usize,
-    /// Their squared lengths.
+    /// The squared lengths of the vectors.
     squares: Vec<f32>,
-    /// What the discriminant says of them.
+    /// The particles' scores of the discriminant.
     pub samples: TrainingSamples,
     comparison: Comparison,
     /// For each particle, its distance to each entry of the bag.
@@ -102,7 +102,8 @@ impl Candidates {
     }
 
     /// Describes the new particles in the channels that `extractor` computed of `image`, and compares them with the
-    /// models of `state`. The many of a wide search come in batches of the usual size: those stay in the caches.
+    /// models of `state`. The many particles of a wide search come in batches of the usual size, which stay in the
+    /// caches.
     pub fn describe_and_compare(
         &mut self,
         image: &Frame,

@@ -1,4 +1,5 @@
-//! What a step's answer was chosen from, for people who want to look at it. A step that is not asked copies nothing.
+//! What a step's answer was chosen from, for people who want to look at it. A step that is not asked for it copies
+//! nothing.
 
 use crate::candidates::Candidates;
 use crate::image::rect::Rect;
@@ -17,7 +18,7 @@ pub struct Diagnostics {
 }
 
 impl Diagnostics {
-    /// Those of a step with these candidates.
+    /// The diagnostics of a step with these candidates.
     pub(crate) fn of(state: &State, candidates: &Candidates) -> Self {
         let boxes = candidates.particles.iter();
         let boxes = boxes.map(|particle| state.target_of(particle));

@@ -27,7 +27,7 @@ pub enum TrackerError {
     /// The frame was reduced to less than the size in which the session works.
     #[error("the frame was reduced to less than the session's working size")]
     Reduced,
-    /// A second opinion is not possible here, or was begun with an expert that is not here.
+    /// A second opinion is not possible with these parameters, or the session began with an expert that is not given.
     #[error("{0}")]
     Expert(&'static str),
     /// The snapshot is damaged, or of another version.

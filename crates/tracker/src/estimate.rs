@@ -40,6 +40,6 @@ pub struct Estimate {
     pub target: Rect,
     /// The chance, in [0, 1], that the box overlaps the target by half or more; with `paper` it only orders frames.
     pub score: f32,
-    /// What the score and its history mean.
+    /// Whether the tracker believes the box.
     pub status: Status,
 }

@@ -7,7 +7,8 @@ use crate::image::rect::Rect;
 /// The shortest side of a box, in pixels of the uploaded frame.
 pub const MIN_BOX_SIDE: f64 = 4.0;
 
-/// From pixels of an upload of size `source` to those of its working image of size `working`, along x and along y.
+/// The factors, along x and along y, from pixels of an upload of size `source` to those of its working image of size
+/// `working`.
 pub(crate) fn to_working(source: (u32, u32), working: (u32, u32)) -> (f64, f64) {
     (
         f64::from(working.0) / f64::from(source.0),
@@ -16,8 +17,8 @@ pub(crate) fn to_working(source: (u32, u32), working: (u32, u32)) -> (f64, f64) 
 }
 
 /// Checks a box given in the pixels of an uploaded frame of size `source`: finite, at least [`MIN_BOX_SIDE`] on each
-/// side and at least one pixel of the working image of size `working`, at most four times as large as the frame, and on
-/// the frame with at least one pixel of its length and height.
+/// side and at least one pixel of the working image of size `working`, no side longer than four times the frame's
+/// longer side, and over the frame by at least one pixel along x and along y.
 pub(crate) fn check_target(
     source: (u32, u32),
     working: (u32, u32),

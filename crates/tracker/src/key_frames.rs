@@ -1,14 +1,14 @@
-//! Key frames of a track: the boxes that annotation tools need, where they draw straight lines between them.
+//! Key frames of a track: the boxes from which annotation tools interpolate the others linearly.
 
 use crate::Rect;
 use std::mem;
 
-/// Picks the key frames of one target's track, as its boxes come. Between two of them linear interpolation gives every
-/// edge of every box left out to within the tolerance.
+/// Picks the key frames of one target's track, as its boxes come. Linear interpolation between two key frames gives
+/// every edge of every box left out to within the tolerance.
 ///
-/// It reaches as far as it can from one key frame to the next (the swing filter: Elmeleegy et al., *Online piece-wise
-/// linear approximation of numerical streams with precision guarantees*, VLDB 2009, with the ends on the boxes), in
-/// constant memory and time a box.
+/// The next key frame is as far from the last as the tolerance allows (the swing filter: Elmeleegy et al., *Online
+/// piece-wise linear approximation of numerical streams with precision guarantees*, VLDB 2009, with the ends on the
+/// boxes), in constant memory and time a box.
 ///
 /// `T` is whatever goes with a box: its row, an annotation.
 #[derive(Debug)]
@@ -19,7 +19,7 @@ pub struct KeyFrames<T> {
     last: Option<(Point, T)>,
 }
 
-/// From a key frame on.
+/// The track from a key frame on.
 #[derive(Debug)]
 struct Segment {
     key: Point,
@@ -44,7 +44,8 @@ impl Segment {
         }
     }
 
-    /// How fast an edge goes from the key frame to this box, with so many pixels added.
+    /// The speed of an edge from the key frame to the box `to`, in pixels a frame; `more` pixels are added to the edge
+    /// of `to`.
     fn slope(&self, to: &Point, edge: usize, more: f64) -> f64 {
         (to.edges[edge] + more - self.key.edges[edge]) / (to.time - self.key.time)
     }
@@ -57,7 +58,7 @@ impl Segment {
         self.key.is_shown == to.is_shown && self.slopes.iter().enumerate().all(passes)
     }
 
-    /// Lines have to pass this box from now on.
+    /// Narrows the slopes to those of lines that pass the box `by` within the tolerance.
     fn narrow(&mut self, by: &Point, tolerance: f64) {
         for edge in 0..4 {
             let least = self.slope(by, edge, -tolerance);
@@ -69,7 +70,8 @@ impl Segment {
 }
 
 impl<T> KeyFrames<T> {
-    /// For boxes that may be off by so many pixels, at least 0.
+    /// Key frames between which an interpolated edge may be off by `tolerance` pixels; a negative tolerance counts as
+    /// 0.
     pub fn new(tolerance: f64) -> Self {
         Self {
             tolerance: tolerance.max(0.0),
@@ -79,7 +81,7 @@ impl<T> KeyFrames<T> {
     }
 
     /// Takes the box of the next frame, and gives the key frames that are certain now, in order: none, one or two. The
-    /// first box is one, so are the first and the last of every run in which the target `is_shown` or is not.
+    /// first box is a key frame; so are the first and the last of every run in which the target `is_shown` or is not.
     pub fn push(&mut self, target: Rect, is_shown: bool, row: T) -> impl Iterator<Item = T> {
         let edges = [
             target.x,
@@ -119,7 +121,8 @@ impl<T> KeyFrames<T> {
         found.into_iter().flatten()
     }
 
-    /// The last box is a key frame; the track ends. What is pushed afterwards begins another one.
+    /// Ends the track and gives its last box, which is a key frame, unless it was given already. A box pushed
+    /// afterwards begins another track.
     pub fn finish(&mut self) -> Option<T> {
         self.segment = None;
         mem::take(&mut self.last).map(|(_, row)| row)

@@ -1,6 +1,6 @@
 //! (C) What a session learns from a frame.
 //!
-//! The background comes before the bag: the bag's subspaces are those of vectors under the new metric.
+//! The background is learned before the bag, whose subspaces are fitted under the background's new metric.
 
 use crate::appearance::background;
 use crate::appearance::color_histogram::ColorPixels;
@@ -17,17 +17,17 @@ use crate::workspace::{Learning, Scratch};
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Localization {
     pub number: u64,
-    /// In the frame.
+    /// The answer, in the frame.
     pub answer: Particle,
-    /// In the rectified view.
+    /// The answer, in the rectified view.
     pub rectified: Particle,
-    /// The distance to the bag's first subspace.
+    /// The best particle's distance to the bag's first subspace.
     pub first_distance: f64,
 }
 
 impl State {
-    /// Keeps what the next frame starts from. The particles speak for the box of a target that `is_followed`, which may
-    /// be lost all the same.
+    /// Keeps what the next frame starts from. `is_followed` tells whether the particles speak for the box; the target
+    /// may be lost all the same.
     pub fn remember(
         &mut self,
         found: &Localization,

@@ -2,7 +2,7 @@
 //! Harandi), as a pure state machine. No async, no HTTP, no files, no clock.
 //!
 //! [`Tracker::new`] takes the first frame and a box; [`Tracker::step`] takes the next frame and answers where the box
-//! is now. `step` reads in the order of the paper's four components, each of which is a room:
+//! is now. `step` reads in the order of the paper's four components, each in modules of its own:
 //!
 //! - **(A)** *Particles* (`motion`): N hypotheses of centre and scale (section III-A).
 //! - **(B)** *Affine subspaces* (`features`, `grassmann`): a candidate area becomes a vector v of length D. With the
@@ -16,7 +16,7 @@
 //!
 //! The preset `robust` extends them. What is the paper's, and what is ours:
 //!
-//! | room | paper | ours |
+//! | module | paper | ours |
 //! |---|---|---|
 //! | `motion` | resampling, Brownian motion | search around the answer, global motion, change test, orientation |
 //! | `features` | gray patches | gradient histograms with chroma |
@@ -25,12 +25,12 @@
 //! | `weights`, `step` | likelihoods, the sum rule, the answer | priors, a second round, pinned entries |
 //! | `classifier`, `scale`, `confidence` | | a discriminant, a filter for the scale, the score and the update gate |
 //!
-//! The other rooms are `image` (frames and boxes), `params` and `linalg`; [`KeyFrames`] thins a finished track.
+//! The other modules are `image` (frames and boxes), `params` and `linalg`; [`KeyFrames`] thins a finished track.
 //!
 //! What the paper leaves open:
 //! - Everything happens in the working image ([`Frame`]), as large as the target asks for ([`Params::frame_format`]);
 //!   boxes come in and go out in the pixels of the uploaded frame.
-//! - Until there are P previous patches V has those there are, and no basis has more columns than V has directions.
+//! - While there are fewer than P previous patches, V has only these. No basis has more columns than V has directions.
 //! - Of two bases with different numbers of columns, the smaller number counts.
 //! - The draws of a frame depend on the seed and the frame's number alone, so a session that is replayed gives the same
 //!   boxes bit for bit on the same machine.

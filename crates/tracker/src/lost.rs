@@ -1,8 +1,8 @@
 //! Where the box of a lost target goes.
 //!
-//! That a target is lost is said, and nothing is learned; where its box goes is another decision. A target in full view
-//! that has turned away is doubted, yet the place where it is still resembles it more than any near it. So the box goes
-//! on with what speaks for it: the particles, else the target's colours, else the camera's motion.
+//! That a target is lost is decided elsewhere; here is decided where its box goes. A target in full view that has
+//! turned away may count as lost, yet its place still resembles it more than any place nearby. So the box follows the
+//! particles where these speak for it, else the target's colours, else the camera's motion.
 
 use crate::image::frame::Frame;
 use crate::motion::particles::Particle;
@@ -10,13 +10,13 @@ use crate::motion::search::{SearchContext, prior_width};
 use crate::state::State;
 use crate::workspace::Scratch;
 
-/// How far a lost target moves in a frame, in working pixels, a standard deviation.
+/// Standard deviation of how far a lost target moves in a frame, in working pixels.
 const COLOR_STD: f64 = 6.0;
 /// The least mean foreground of a place that has the target's colours; 0 is a place that says nothing.
 const MIN_FOREGROUND: f64 = 0.05;
 
 impl State {
-    /// The box of a lost target in the rectified view, and whether the particles speak for it.
+    /// The box of a lost target in the rectified view, and whether the particles speak for this box.
     pub fn place_lost(
         &self,
         image: &Frame,

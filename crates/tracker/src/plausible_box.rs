@@ -24,7 +24,7 @@ pub enum ImplausibleBox {
         /// `width` or `height`.
         side: &'static str,
     },
-    /// It is in fractions of the frame.
+    /// The box is in fractions of the frame.
     #[error(
         "the box looks like fractions of the frame; give pixels: in this frame of {} x {} that is `box={pixels}`",
         size.0,
@@ -36,7 +36,7 @@ pub enum ImplausibleBox {
         /// The box in pixels.
         pixels: String,
     },
-    /// It is two corners.
+    /// The box is two corners.
     #[error(
         "the box lies by {percent} % outside the frame of {} x {}, and looks like x1,y1,x2,y2; give x,y,width,height: \
          `box={pixels}`",
@@ -44,7 +44,7 @@ pub enum ImplausibleBox {
         size.1
     )]
     Corners {
-        /// How much of it lies outside.
+        /// The share of the box that lies outside the frame, in percent.
         percent: f64,
         /// The frame's width and height.
         size: (u32, u32),
@@ -140,7 +140,7 @@ fn as_corners(target: &Rect, (width, height): Size) -> Option<String> {
     is_box.then(|| shown(x, y, right - x, bottom - y))
 }
 
-/// To a tenth of a pixel.
+/// The four numbers, rounded to a tenth of a pixel, with commas between.
 fn shown(x: f64, y: f64, width: f64, height: f64) -> String {
     [x, y, width, height]
         .map(|n| ((n * 10.0).round() / 10.0).to_string())

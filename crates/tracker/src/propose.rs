@@ -12,7 +12,7 @@ use crate::state::State;
 use crate::workspace::Scratch;
 
 impl State {
-    /// (A) Draws the first round of particles, in the channels of `image` that it computes.
+    /// (A) Computes the channels of `image` and draws the first round of particles.
     pub fn propose(
         &self,
         image: &Frame,
@@ -64,8 +64,8 @@ impl State {
         }
     }
 
-    /// (B) and (D) Describes, compares and weighs the particles that were drawn since the last time, in `image`.
-    /// Returns the most likely one of all.
+    /// (B) and (D) Describes, compares and weighs the particles that were drawn since the last call, in `image`.
+    /// Returns the index of the most likely of all particles.
     pub fn weigh_particles(
         &self,
         image: &Frame,
@@ -81,8 +81,8 @@ impl State {
             .posterior(&scratch.log_priors, &self.params)
     }
 
-    /// The logarithms of the priors of the new particles: of their displacement, and of whether anything has come
-    /// there.
+    /// Appends the logarithms of the priors of the new particles: of their displacement, of the colours in their boxes,
+    /// and of whether anything has come there.
     fn push_log_priors(&self, search: &SearchContext<'_>, scratch: &mut Scratch) {
         let known = scratch.log_priors.len();
         let new = &scratch.candidates.particles[known..];

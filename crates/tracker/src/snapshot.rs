@@ -23,10 +23,10 @@ use crate::workspace;
 pub const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
 const VERSION: u32 = 17;
-/// Of a state with a second opinion.
+/// The version of a snapshot with a second opinion.
 const EXPERT_VERSION: u32 = 0x1_0000 + VERSION;
 const HEADER: usize = 16;
-/// What most snapshots have room in, so that they are not moved while they grow.
+/// The memory that is reserved for a snapshot: most fit in, and are not moved while they grow.
 const USUAL_BYTES: usize = 80 << 10;
 
 const NO_EXPERT: &str = "the session has a second opinion by a network, which is not loaded here: give it with --model, in \
@@ -36,7 +36,7 @@ const OTHER_EXPERT: &str = "the session has another second opinion than the one 
 
 /// No feature has a greater magnitude; gray values are in [0, 1].
 const MAX_FEATURE: f32 = 1e3;
-/// Frame numbers are below: 2^53 can also be said exactly in JSON.
+/// Frame numbers are below this, so that they are exact in JSON, too.
 const FRAMES: u64 = 1 << 53;
 
 /// The snapshot of `state`.
@@ -57,8 +57,8 @@ pub(crate) fn write(state: &State) -> Vec<u8> {
     bytes
 }
 
-/// The state in `bytes`, fully checked. One with a second opinion is that of `expert`. What it shares with `known`,
-/// which may be any state, is not computed again.
+/// The state in `bytes`, fully checked. A second opinion in it must be that of `expert`. What the state shares with
+/// `known`, which may be any state, is not computed again.
 pub(crate) fn read(
     bytes: &[u8],
     expert: Option<&dyn Expert>,

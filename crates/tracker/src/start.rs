@@ -96,7 +96,7 @@ impl State {
     ) {
         let Workspace { views, scratch } = workspace;
         let image = self.working_view(frame, &mut views.downsampled);
-        // All particles are there, with equal weights.
+        // All particles are at the answer, with equal weights.
         self.cloud = Cloud::at(self.answer, &self.params);
         let profiles = || GlobalMotion::new(frame);
         self.global_motion = self.params.global_motion.then(profiles);
@@ -144,8 +144,8 @@ impl State {
 
     /// Appends the feature vectors of the augmented views of the answer to `features`: copies rotated by some degrees
     /// either way. A subspace of one vector is a point; with these it spans what the target looks like when it tilts.
-    /// The frame is rotated, so the rim shows what would be there. The extractor has the channels of the last of them
-    /// then.
+    /// The whole frame is rotated, so a copy shows the surroundings at its rim. Afterwards the extractor has the
+    /// channels of the last copy.
     fn describe_augmented(
         &self,
         image: &Frame,

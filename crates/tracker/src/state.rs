@@ -21,7 +21,7 @@ use crate::scale::dsst::ScaleFilter;
 
 /// By how much of its usual width the search widens in each frame in which the target is lost.
 const WIDENING: f64 = 0.5;
-/// Three standard deviations of the widest search, in sides √(width · height) of the target. A wider one costs more,
+/// Three standard deviations of the widest search, in sides √(width · height) of the target. A wider search costs more,
 /// and finds look-alikes.
 const MAX_SEARCHED_SIDES: f64 = 5.0;
 
@@ -31,7 +31,7 @@ pub(crate) struct State {
     pub params: Params,
     /// Width and height of the uploaded frames.
     pub source: (u32, u32),
-    /// How its frames are seen: decided by the first frame and its box.
+    /// How the session's frames are seen: decided by the first frame and its box.
     pub format: FrameFormat,
     pub bounds: StateBounds,
     pub estimate: Estimate,
@@ -52,7 +52,7 @@ pub(crate) struct State {
     pub orientation: f64,
     /// For how many frames nothing has spoken for the box of a lost target, less those in which its particles did.
     pub frames_lost: u32,
-    /// With an expert beside the filter. A snapshot carries it after the rest.
+    /// What the session keeps of its expert, if it has one. A snapshot carries it after the other fields.
     #[serde(skip)]
     pub second_opinion: Option<SecondOpinion>,
 }

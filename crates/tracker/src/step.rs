@@ -42,7 +42,7 @@ impl State {
             best = self.weigh_particles(views.rectified, &search, scratch);
         }
 
-        // Answer (equation 12). That the target is lost is said; where its box goes is another decision.
+        // Answer (equation 12). Whether the target is lost, and where the box of a lost target goes, are two decisions.
         let candidates = &scratch.candidates;
         let first_distance = candidates.first_distance_of(best);
         let is_lost = self.update_gate.is_lost(

@@ -28,7 +28,7 @@ const NO_PROBABILITY: &str = "a second opinion goes with the preset robust: with
 pub struct Tracker {
     state: State,
     evidence: Option<Evidence>,
-    /// There where the state has a second opinion.
+    /// None where the state has no second opinion.
     expert: Option<Arc<dyn Expert>>,
 }
 
@@ -43,8 +43,7 @@ impl Tracker {
         Self::beside(frame, target, params, None)
     }
 
-    /// As [`new`](Self::new), with an expert beside the filter, which is asked in every frame. Without one this is
-    /// `new`.
+    /// As [`new`](Self::new), with an expert beside the filter. Without an expert this is `new`.
     ///
     /// # Errors
     /// As for [`new`](Self::new); also an expert with parameters that take none ([`Params::takes_expert`]), as those of
@@ -131,7 +130,7 @@ impl Tracker {
             .ok_or(TrackerError::Reduced)
     }
 
-    /// How this session sees its frames. One that comes in this format is not copied.
+    /// How this session sees its frames. A frame in this format is not copied.
     pub fn frame_format(&self) -> FrameFormat {
         self.state.format
     }
@@ -208,8 +207,9 @@ impl Tracker {
         Self::restored(snapshot, expert, None)
     }
 
-    /// As [`restore_beside`](Self::restore_beside), beside an earlier or later state of the same session. What both
-    /// have in common is not computed again, which takes most of the time. The tracker is the same, bit for bit.
+    /// As [`restore_beside`](Self::restore_beside), where `self` is at an earlier or later state of the same session.
+    /// What both states have in common is not computed again, which saves most of the time. The restored tracker is the
+    /// same, bit for bit.
     ///
     /// # Errors
     /// As for [`restore_beside`](Self::restore_beside).

@@ -14,7 +14,7 @@ use crate::workspace::{Scratch, ViewBuffers};
 pub(crate) struct Views<'a> {
     /// The frame, in larger pixels where the target is large.
     pub working: &'a Frame,
-    /// The same with a rotated target upright, within the window of the search.
+    /// `working`, rotated within the window of the search so that a rotated target is upright.
     pub rectified: &'a Frame,
 }
 

@@ -2,12 +2,13 @@
 //!
 //! In: N x K distances in \[0, 1\], σ, and for each particle the logarithm of its prior. Out: N weights with the sum 1.
 //! exp(-dist / σ) underflows for every candidate as soon as the nearest is some hundred σ away, and 0 / 0 is no
-//! likelihood. Equation 10 normalises over the candidates, so the least distance to an entry may be taken from all
-//! distances to it first: the result is the same, and the largest term is always 1.
+//! likelihood. Equation 10 normalises over the candidates, so the least distance to an entry may be subtracted from all
+//! distances to that entry first: the result is the same, and the largest term is always 1.
 
 use pulp::{Arch, Simd};
 
-/// Larger exponents are taken relative to the largest: from e^710 on there is no number, and a sum of many must be one.
+/// Where an exponent is larger, all are taken relative to the largest: e^710 overflows, and a sum of many exponentials
+/// must not.
 const MAX_EXPONENT: f64 = 600.0;
 
 /// The likelihoods of a frame's particles; keeps its buffers.
@@ -22,9 +23,9 @@ pub struct Likelihoods {
 /// Computes the likelihoods of `distances`, which hold for each particle its distance to each entry of the bag, and
 /// from them `weights`, one for each particle.
 ///
-/// A weight begins as an exponent, what is known of the particle besides (0: nothing), and becomes the exponential of
-/// that times the sum of the particle's likelihoods over the bag (equation 9), scaled so that all sum to 1. In the sum
-/// the first `pinned.0` entries count `pinned.1` times.
+/// On entry `weights` holds an exponent for each particle, the logarithm of its prior (0 for none). On return a weight
+/// is the exponential of that exponent times the sum of the particle's likelihoods over the bag (equation 9), scaled so
+/// that all sum to 1. In the sum the first `pinned.0` entries count `pinned.1` times.
 #[pulp::with_simd(sum_rule_weights = Arch::new())]
 #[inline(always)]
 pub fn sum_rule_weights_simd<S: Simd>(

@@ -20,9 +20,9 @@ use crate::scale::pyramid;
 /// The memory of one frame.
 #[derive(Debug, Default)]
 pub(crate) struct Workspace {
-    /// What the frame is looked at in.
+    /// The views of the frame.
     pub views: ViewBuffers,
-    /// What is computed from that.
+    /// What is computed from the views.
     pub scratch: Scratch,
 }
 
@@ -33,7 +33,7 @@ pub(crate) struct ViewBuffers {
     pub rectified: Frame,
 }
 
-/// What is computed of a frame, room by room.
+/// What is computed of a frame, module by module.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     /// The profiles of the present frame.
@@ -46,11 +46,11 @@ pub(crate) struct Scratch {
     pub sums: Vec<f64>,
     /// For each particle the logarithm of its prior.
     pub log_priors: Vec<f64>,
-    /// Particles where they are in the frame that is not rotated.
+    /// The new particles at their places in the frame, not in its rotated view.
     pub in_frame: Vec<Particle>,
     pub candidates: Candidates,
     pub learning: Learning,
-    /// The frame at other angles of the target.
+    /// The frame rotated for other angles of the target.
     pub rotated: [RotatedView; orientation::HYPOTHESES],
 }
 

@@ -5,7 +5,7 @@
 //! turns. A frame passes while that distance is below a multiple of its running mean. The mean follows slowly in frames
 //! that do not pass, too, so a lasting change is accepted in the end.
 //!
-//! Where such jumps are usual the score decides: a frame passes only if its box is right two times of three.
+//! With a discriminant the score decides too: a frame passes only if its box is right about two times of three.
 
 use serde::{Deserialize, Serialize};
 
@@ -28,8 +28,8 @@ const MIN_MEAN: f64 = 0.15;
 /// learned as the target, and the next box would be further off.
 const MIN_SCORE: f32 = 0.65;
 /// Below this score of the discriminant the target is lost: nothing is learned, and the search widens from frame to
-/// frame until the target is found again, unless the box is followed. The discriminant says 0.5 to 1 on the target, and
-/// about 0.1 beside it.
+/// frame until the target is found again. It narrows in frames in which the box follows the particles. The discriminant
+/// says 0.5 to 1 on the target, and about 0.1 beside it.
 const LOST_THRESHOLD: f64 = 0.35;
 /// How much better than the lost threshold the discriminant must score a target that is found again.
 const FOUND_MARGIN: f64 = 0.2;

@@ -12,8 +12,8 @@ use pulp::{Arch, Simd};
 /// Added to a number below 2^51, it leaves the nearest whole number in the last bits.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 
-/// Target rows that are averaged together: they fill a vector register of SSE or WebAssembly, while which columns a
-/// target pixel covers changes from one to the next. Twice as many were slower.
+/// Target rows that are averaged together, in one vector register of SSE or WebAssembly. Columns are not, since which
+/// source columns a target pixel covers changes from one to the next. Twice as many rows were slower.
 const ROWS: usize = 4;
 
 /// The source pixels of one target pixel: `begin..end` wholly, the one before and the one after in part, in units of
@@ -68,8 +68,8 @@ pub fn area_average_simd<S: Simd>(
     }
 }
 
-/// The means of whole squares of `FACTOR` pixels a side, rounded, of these columns of squares. `pixels` begins with the
-/// first row of squares, and `out` says how many rows there are.
+/// The means of whole squares of `FACTOR` pixels a side, rounded, of the squares in `columns`. `pixels` begins with the
+/// first row of squares, and the length of `out` tells how many rows there are.
 #[inline(always)]
 pub(crate) fn square_means<const FACTOR: usize>(
     pixels: &[u8],
@@ -105,8 +105,8 @@ fn any_sizes(luma: &[u8], source: (u32, u32), target: (u32, u32), out: &mut [u8]
     }
 }
 
-/// [`area_average`], where `Sum` holds that of a target pixel: up to 255 times the source's pixels. Sums over more
-/// columns may wrap around, and their difference is right all the same.
+/// [`area_average`], where `Sum` holds the weighted sum of a target pixel: up to 255 times the number of the source's
+/// pixels. Sums over more columns may wrap around; their difference is right all the same.
 #[inline(always)]
 fn average<Sum>(luma: &[u8], source: (u32, u32), target: (u32, u32), out: &mut [u8])
 where
@@ -118,13 +118,13 @@ where
     let unit: Sum = target.0.as_();
     let divisor = Divisor::new(u64::from(source.0) * u64::from(source.1));
     let mut sums: [Vec<u32>; ROWS] = std::array::from_fn(|_| vec![0; width]);
-    // The last target pixel ends at the last column's end, and of what follows it takes nothing.
+    // The last target pixel ends where the last column ends. The value after that is read, and counts 0 times.
     let mut integral = vec![[Sum::default(); ROWS]; width + 2];
     let mut totals = vec![[Sum::default(); ROWS]; columns];
     let mut averages = vec![[0_u8; ROWS]; columns];
     let cells = cells(source.1, target.1);
     for (cells, out) in cells.chunks(ROWS).zip(out.chunks_mut(ROWS * columns)) {
-        // Rows first: that loop runs over every source pixel, and this way it is contiguous.
+        // Rows are summed first: that loop runs over every source pixel, and in this order its memory is contiguous.
         for (cell, sums) in cells.iter().zip(&mut sums) {
             sum_rows(luma, cell, target.1, sums);
         }
@@ -194,8 +194,8 @@ where
     }
 }
 
-/// Where each target pixel begins, and where the last one ends: a source column, and how much of it lies before, in
-/// units of `1 / T`.
+/// Where each target pixel begins, and where the last one ends: a source column, and how much of it lies before the
+/// boundary, in units of `1 / T`.
 fn boundaries(source: u32, target: u32) -> Vec<(u32, u32)> {
     let (source, target) = (u64::from(source), u64::from(target));
     (0..=target)
@@ -218,8 +218,9 @@ impl Divisor {
         }
     }
 
-    /// The nearest whole number to the quotient, the larger of two; `value` is a whole number. As long as the divisor
-    /// is below 2^40, what is added to the value outweighs the rounding, and does not reach the next quotient.
+    /// The nearest whole number to the quotient, of two equally near ones the larger; `value` is a whole number. As
+    /// long as the divisor is below 2^40, the 0.25 that is added to the value outweighs the rounding, and does not
+    /// reach the next quotient.
     #[inline(always)]
     fn rounded(&self, value: f64) -> u8 {
         ((value + 0.25) * self.inverse + ROUND).to_bits() as u8

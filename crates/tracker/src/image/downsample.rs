@@ -26,7 +26,7 @@ pub(crate) fn factor(first_cell: f64, cell: f64, frame_side: f64) -> usize {
     let mut factor = 1;
     while factor < MAX_FACTOR {
         let next = (2 * factor) as f64;
-        // A box may be larger than the frame, whose chroma needs a pixel too.
+        // A box may be larger than the frame, and the frame's chroma must keep a pixel.
         if first_cell < MIN_CELL_SIDE * next
             || cell < MIN_SHRUNK_CELL_SIDE * next
             || frame_side < 2.0 * next
@@ -38,8 +38,8 @@ pub(crate) fn factor(first_cell: f64, cell: f64, frame_side: f64) -> usize {
     factor
 }
 
-/// `frame` in pixels that are `factor` = 2 or 4 times as large; neither side of the frame is shorter than twice that.
-/// The memory of `scratch` is used again, whatever it holds.
+/// `frame` in pixels that are `factor` = 2 or 4 times as large; neither side of the frame is shorter than twice the
+/// factor. The memory of `scratch` is used again, whatever it holds.
 pub(crate) fn downsampled(frame: &Frame, factor: usize, scratch: Frame) -> Frame {
     frame.map_planes(scratch, |plane, mut pixels| {
         let columns = downsample(plane, factor, &mut pixels);

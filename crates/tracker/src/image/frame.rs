@@ -1,7 +1,7 @@
 //! The frames that the tracker sees: luma, and chroma where there is colour.
 //!
-//! A frame remembers the size that it was uploaded with, which is what boxes are given in. A session sees all its
-//! frames in one [`FrameFormat`]; a decoder that knows it need not make larger ones.
+//! A frame remembers the size that it was uploaded with; boxes are given in pixels of that size. A session sees all its
+//! frames in one [`FrameFormat`]; a decoder that knows the format need not make larger frames.
 
 use std::borrow::Cow;
 

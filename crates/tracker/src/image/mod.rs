@@ -7,7 +7,7 @@
 //! | file | holds |
 //! |---|---|
 //! | [`frame`] | [`Frame`](frame::Frame), one uploaded frame: luma and, with colour, chroma |
-//! | [`plane`] | one channel of it |
+//! | [`plane`] | one channel of a frame |
 //! | [`ycbcr`] | RGB to luma and chroma |
 //! | [`resolution`] | the size in which a session works |
 //! | [`rect`] | [`Rect`](rect::Rect), an axis-parallel box |
@@ -15,9 +15,9 @@
 //! | [`downsample`] | a working image in pixels 2 or 4 times as large |
 //! | [`warp`] | a working image rotated about a point |
 //!
-//! Errors: only [`Frame`](frame::Frame) checks its input ([`FrameError`](frame::FrameError): no pixels, or not
-//! width x height of them). All else takes frames that exist, so a frame has at least one pixel everywhere. Boxes may
-//! reach over the edge; what is beyond it is said in each file.
+//! Errors: only [`Frame`](frame::Frame) checks its input ([`FrameError`](frame::FrameError): no pixels, or not width x
+//! height of them). All else takes frames that exist, so a frame has at least one pixel everywhere. Boxes may reach
+//! over the edge; each file says what is beyond it.
 //!
 //! Nothing here knows what is tracked or how: no features, no particles, no state.
 

@@ -36,7 +36,7 @@ impl Plane {
         Self::new(size, pixels, self.pixel_side)
     }
 
-    /// Row `y`; beyond the edge the edge's row.
+    /// Row `y`; beyond the lower edge the last row.
     #[inline(always)]
     pub fn row(&self, y: usize) -> &[u8] {
         let width = self.width as usize;

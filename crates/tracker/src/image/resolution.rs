@@ -1,7 +1,7 @@
 //! The size in which a session works: it follows the target, not the frame.
 //!
-//! A target of few pixels is recognised by little, and one of many is no better for them. So the working image is such
-//! that the target has a standard size in the first frame.
+//! A target of few pixels shows little to recognise it by, and beyond a standard size more pixels do not help. So the
+//! working image is such that the target has a standard size in the first frame.
 
 use crate::image::rect::Rect;
 
@@ -11,10 +11,10 @@ pub const MIN_WORKING_SIDE: u32 = 320;
 /// The longest side of a working image, in pixels. It bounds what a session costs.
 pub const MAX_WORKING_SIDE: u32 = 1280;
 
-/// The size of the working image of uploads of the size `source`, both sides above 0: never larger than these, the
-/// aspect kept, each side rounded to whole pixels. In it `target`, a box in the upload's pixels, has √(width · height)
-/// of `target_side` working pixels, within the limits of the working side. With a `target_side` of 0 the longer side is
-/// [`MIN_WORKING_SIDE`].
+/// The size of the working image of uploads of the size `source`, both sides above 0: never larger than the uploads,
+/// the aspect kept, each side rounded to whole pixels. In it `target`, a box in the upload's pixels, has √(width ·
+/// height) of `target_side` working pixels, within the limits of the working side. With a `target_side` of 0 the longer
+/// side is [`MIN_WORKING_SIDE`].
 pub(crate) fn working_size(source: (u32, u32), target: &Rect, target_side: f64) -> (u32, u32) {
     let longer = source.0.max(source.1);
     let wanted = f64::from(longer) * target_side / (target.width * target.height).sqrt();

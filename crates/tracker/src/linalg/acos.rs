@@ -38,7 +38,7 @@ const ARCSIN_SQUARED: [f64; 17] = [
 pub(crate) fn squared_angles(squared_cosines: &[f64; LANES]) -> [f64; LANES] {
     let mut angles = [0.0; LANES];
     for lane in 0..LANES {
-        // The squares of all three.
+        // `cosine`, `sine` and `smaller` are squares.
         let cosine = squared_cosines[lane].clamp(0.0, 1.0);
         let sine = 1.0 - cosine;
         let smaller = if cosine < sine { cosine } else { sine };

@@ -22,15 +22,15 @@ use pulp::x86::{V3, V4};
 
 /// A number whose products are summed.
 pub(crate) trait Element: Copy + Default {
-    /// A vector register of them.
+    /// A vector register of such numbers.
     type Lanes<S: Simd>: Copy;
     /// A product or a sum of products.
     type Sum: Copy + Default + AddAssign;
     /// A vector register of sums.
     type Sums<S: Simd>: Copy;
-    /// Whether a product is added in the instruction that makes it, so that it needs no register.
+    /// Whether one instruction multiplies and adds, so that the product needs no register of its own.
     const IS_FUSED: bool;
-    /// Values as registers, and those left over.
+    /// The values as registers, and the values left over.
     fn lanes<S: Simd>(values: &[Self]) -> (&[Self::Lanes<S>], &[Self]);
     /// A register of zeros.
     fn zeros<S: Simd>(simd: S) -> Self::Sums<S>;
@@ -41,7 +41,7 @@ pub(crate) trait Element: Copy + Default {
         b: Self::Lanes<S>,
         sums: Self::Sums<S>,
     ) -> Self::Sums<S>;
-    /// The sum of each register, at most four in a row.
+    /// The sum of each register; `B` is at most 4.
     fn sum<S: Simd, const A: usize, const B: usize>(
         simd: S,
         sums: [[Self::Sums<S>; B]; A],
@@ -206,7 +206,7 @@ fn sum_row<S: Simd, const N: usize>(simd: S, row: [S::i32s; N]) -> [i32; N] {
             return sums_of_eight(v3, row.map(cast));
         }
     }
-    let _ = simd; // others have no quicker way
+    let _ = simd; // other instruction sets have no quicker way
     row.map(|sums| numbers::<_, i32>(&sums).iter().sum())
 }
 

@@ -1,5 +1,5 @@
 //! Vectors as whole numbers of 16 bits, each times a scale of its own: a register holds twice as many as in single
-//! precision, and their inner products are exact, so the same on all machines.
+//! precision, and inner products of whole numbers are exact, so the same on all machines.
 
 use pulp::{Arch, Simd};
 
@@ -9,7 +9,7 @@ use super::{gemm, vector_ops};
 /// Added to a number below 2^22, it leaves the nearest whole number in the last bits.
 const ROUND: f32 = 12_582_912.0;
 
-/// Writes the whole number of these bits, the last of which count.
+/// A whole number that is made of the last bits of a longer one.
 pub(crate) trait FromBits {
     fn from_bits(bits: u32) -> Self;
 }
@@ -28,8 +28,7 @@ impl FromBits for i16 {
     }
 }
 
-/// Writes `vector` to `out` as whole numbers, the largest of which is `max` or -`max`. Returns what a step of them is
-/// worth.
+/// Writes `vector` to `out` as whole numbers, the largest of which is `max` or -`max`. Returns the value of a step.
 #[inline(always)]
 pub(crate) fn quantize<T: FromBits>(vector: &[f32], max: f32, out: &mut [T]) -> f32 {
     let scale = largest(vector) / max;
@@ -54,14 +53,14 @@ fn write<T: FromBits>(vector: &[f32], scale: f32, out: &mut [T]) {
     }
 }
 
-/// Most of a vector's length: the square of it, which no inner product of two exceeds, has 31 bits. Rounding adds less
-/// than what is left.
+/// The greatest length of a vector, in steps. Its square, which no inner product of two vectors exceeds, has 31 bits,
+/// and leaves room for what rounding adds.
 const MAX_LENGTH: f32 = 46_000.0;
-/// Most of a value.
+/// The greatest magnitude of a value, in steps.
 const MAX_VALUE: f32 = 32_000.0;
 
-/// A set of vectors of one length D, in steps as fine as sums of 32 bits allow. Coarser ones, and what differs in the
-/// last bits in a browser becomes another box.
+/// A set of vectors of one length D, in steps as fine as sums of 32 bits allow. With coarser steps, a difference in the
+/// last bits, as there is in a browser, could become another box.
 #[derive(Debug, Default)]
 pub(crate) struct FixedPoint {
     values: AlignedBuffer<i16>,
@@ -88,8 +87,8 @@ impl FixedPoint {
         set(self, vectors, len);
     }
 
-    /// The inner products of each vector with each of `others`, all of length `len`: those of the `i`-th from
-    /// `out[i * stride]` on. What stands between them is 0. `sums` is scratch.
+    /// The inner products of each vector with each of `others`, all of length `len`: those of the `i`-th from `out[i *
+    /// stride]` on. What is between the rows of products is 0. `sums` is scratch.
     #[inline(always)]
     pub fn inner_products<S: Simd>(
         &self,

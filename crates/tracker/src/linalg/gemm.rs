@@ -12,7 +12,7 @@ use pulp::Simd;
 
 use super::element::Element;
 
-/// Vectors of the second set, at most, that stay in the cache: of 768 single-precision values 24 KB.
+/// Vectors of the second set, at most, that stay in the cache: eight of 768 single-precision values take 24 KB.
 const BLOCK: usize = 8;
 
 /// The inner products of each of the vectors `a` with each of the vectors `b`, all of length `len`: those of the
@@ -154,7 +154,7 @@ mod tests {
         }
     }
 
-    /// Exactly, whatever the machine has: each kind of instruction that there is here.
+    /// With each kind of vector instructions that this machine has.
     #[test]
     fn products_of_whole_numbers_are_exact() {
         for (count_a, count_b, len) in [(1, 1, 5), (7, 5, 64), (40, 21, 71), (13, 9, 768)] {

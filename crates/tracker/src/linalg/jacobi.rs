@@ -119,7 +119,7 @@ mod tests {
 
     use super::*;
 
-    /// Those of a matrix of `dim` rows, padded with zeros: the first `dim` components of all eleven.
+    /// The eleven eigenpairs of a matrix of `dim` rows padded with zeros; of each vector the first `dim` components.
     fn padded(matrix: &[f64], dim: usize) -> Vec<(f64, Vec<f64>)> {
         let element = |i: usize, j: usize| match i.max(j) < dim {
             true => matrix[i * dim + j],

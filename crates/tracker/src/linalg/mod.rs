@@ -14,9 +14,9 @@
 //! In and out: plain slices. A set of n vectors of length D is one slice of n D values, one vector after the other; a
 //! matrix is a slice in row order. Nothing has a unit, and nothing is allocated but by buffers that grow.
 //!
-//! What takes `simd: S` is compiled for the vector instructions of its caller; its namesake without is the entry
-//! that detects those of this machine once. Rounding depends on the width of the vector registers, so results are
-//! the same bit for bit on machines of one kind only.
+//! A function that takes `simd: S` is compiled for the vector instructions of its caller. The function of the same name
+//! without `simd` detects the instructions of this machine, once, and calls it. Rounding depends on the width of the
+//! vector registers, so results are the same bit for bit on machines of one kind only.
 //!
 //! What can go wrong: slices whose lengths do not fit panic. Infinities and NaN pass through as IEEE 754 says; `jacobi`
 //! ends on them after a fixed number of sweeps.

@@ -16,7 +16,7 @@ pub(crate) struct AlignedBuffer<T> {
 }
 
 impl<T: Copy + Default> AlignedBuffer<T> {
-    /// Makes the buffer `len` values long. They hold anything.
+    /// Makes the buffer `len` values long. Its values are arbitrary.
     pub fn resize(&mut self, len: usize) {
         const LINE: usize = 64;
         let max_before = LINE / size_of::<T>() - 1;
