@@ -1,4 +1,4 @@
-//! A reader that keeps what it has read ahead where it is sent somewhere near: demuxers go from box to box.
+//! A reader that keeps the bytes that it has read ahead when a seek stays among them: demuxers seek from box to box.
 
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
@@ -8,7 +8,7 @@ const AHEAD: usize = 256 << 10;
 #[derive(Debug)]
 pub struct Buffered<R> {
     reader: BufReader<R>,
-    /// Of the file.
+    /// The length of the file, in bytes.
     size: u64,
 }
 
@@ -37,7 +37,7 @@ impl<R: Seek> Seek for Buffered<R> {
             SeekFrom::Current(by) => from.checked_add_signed(by),
             SeekFrom::End(by) => self.size.checked_add_signed(by),
         };
-        // A part whose size is not known ends with the file: Matroska says so by the largest number.
+        // A Matroska element whose size is unknown has the largest size there is; it ends with the file.
         let to = to.ok_or(io::ErrorKind::InvalidInput)?.min(self.size);
         self.reader
             .seek_relative(to.cast_signed() - from.cast_signed())?;

@@ -28,11 +28,11 @@ use thiserror::Error;
 pub struct Index {
     /// As `codec` of a `VideoDecoderConfig` of WebCodecs: "avc1.64001f".
     pub codec: String,
-    /// As `description` of one: what H.264 and H.265 need to know before the first sample.
+    /// As `description` of a `VideoDecoderConfig`: what a decoder of H.264 or H.265 must know before the first sample.
     pub description: Option<Vec<u8>>,
     /// How far the pictures are to be turned clockwise, in degrees: 0, 90, 180 or 270.
     pub rotation: u16,
-    /// In the order of decoding. The first of them needs no other one.
+    /// The samples, in the order of decoding. The first can be decoded without the others.
     pub samples: Vec<Sample>,
 }
 
@@ -41,9 +41,9 @@ pub struct Index {
 pub struct Sample {
     /// Its first byte in the file.
     pub offset: u64,
-    /// In bytes.
+    /// Its length in bytes.
     pub size: u32,
-    /// When it is shown, in microseconds. No two of a file are shown at the same time.
+    /// When it is shown, in microseconds. No two samples that are shown have the same time.
     pub time: i64,
     /// Whether it can be decoded without the ones before it.
     pub is_key: bool,
@@ -54,16 +54,16 @@ pub struct Sample {
 /// Why a file has no index.
 #[derive(Debug, Error)]
 pub enum DemuxError {
-    /// It cannot be read, or ends too early.
+    /// The file cannot be read, or ends too early.
     #[error(transparent)]
     Io(#[from] std::io::Error),
-    /// It is not an MP4 file, or a damaged one.
+    /// The file is not an MP4 file, or a damaged one.
     #[error(transparent)]
     Mp4(#[from] re_mp4::Error),
-    /// It is a damaged Matroska file.
+    /// The file is a damaged Matroska file.
     #[error(transparent)]
     Matroska(#[from] matroska_demuxer::DemuxError),
-    /// It has no pictures, or none at all is shown.
+    /// The file has no pictures, or none of them is shown.
     #[error("the file has no pictures")]
     NoPictures,
     /// No browser decodes its pictures, or they are packed in a way that is not known here.
@@ -80,12 +80,14 @@ pub enum DemuxError {
     Order,
 }
 
-/// VP9 of any profile, for a decoder that reads in the pictures what they are: 8 bits, level 5.1.
+/// VP9 of any profile and level. The string says profile 0, level 5.1, 8 bits; a decoder reads the true ones in the
+/// pictures.
 const VP9: &str = "vp09.00.51.08";
 /// The bytes that a Matroska file begins with.
 const EBML: [u8; 4] = [0x1a, 0x45, 0xdf, 0xa3];
 
-/// Reads what a file says of its pictures: of MP4 and MOV the boxes around them, of WebM and Matroska all of it.
+/// Reads what a file says of its pictures: of MP4 and MOV the boxes around the pictures, of WebM and Matroska the whole
+/// file.
 ///
 /// # Errors
 /// [`DemuxError`]: for a file that has no index which can be relied on.
@@ -102,7 +104,7 @@ pub fn index<R: Read + Seek>(mut reader: R) -> Result<Index, DemuxError> {
         true => matroska::index(reader),
         false => mp4::index(reader, size),
     }?;
-    // Of a file that ends too early, what there is.
+    // Of a file that ends too early, the samples before its end are kept.
     let is_there = |it: &Sample| it.offset.saturating_add(it.size.into()) <= size;
     let count = index.samples.iter().take_while(|it| is_there(it)).count();
     index.samples.truncate(count);

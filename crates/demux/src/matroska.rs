@@ -6,7 +6,7 @@ use std::cell::RefCell;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::rc::Rc;
 
-/// H.264 of any profile and level, for a decoder that reads them in the pictures.
+/// H.264 of any profile and level. A decoder reads the true ones in the pictures.
 const H264: &str = "avc1.640034";
 
 pub fn index<R: Read + Seek>(reader: R) -> Result<Index, DemuxError> {
@@ -36,7 +36,7 @@ pub fn index<R: Read + Seek>(reader: R) -> Result<Index, DemuxError> {
             offset: offset(&reads.borrow(), &frame.data)?,
             size: u32::try_from(frame.data.len()).map_err(|_| DemuxError::Order)?,
             time: (frame.timestamp.saturating_mul(scale) / 1000).cast_signed(),
-            // In a block of a group it is not told.
+            // A block in a group does not tell whether it is a key frame.
             is_key: frame.is_keyframe.unwrap_or(samples.is_empty()),
             is_shown: !frame.is_invisible,
         });
@@ -49,7 +49,7 @@ pub fn index<R: Read + Seek>(reader: R) -> Result<Index, DemuxError> {
     })
 }
 
-/// The codec of a track, and what it needs to know ahead.
+/// The codec of a track, and what a decoder must know before the first sample.
 fn codec(track: &TrackEntry) -> Result<(String, Option<Vec<u8>>), DemuxError> {
     let unknown = || DemuxError::Codec(track.codec_id().to_owned());
     if track.content_encodings().is_some_and(|it| !it.is_empty()) {
@@ -62,7 +62,7 @@ fn codec(track: &TrackEntry) -> Result<(String, Option<Vec<u8>>), DemuxError> {
             let codec = format!("avc1.{profile:02x}{constraints:02x}{level:02x}");
             Ok((codec, Some(config.to_vec())))
         }
-        // As a byte stream: what is needed stands before each key picture, its level too.
+        // A byte stream: the parameters stand before each key picture, the level among them.
         ("V_MPEG4/ISO/AVC", _) => Ok((H264.to_owned(), None)),
         // The AV1 Codec ISO Media File Format Binding, 2.3.3.
         ("V_AV1", Some([_, profile_and_level, depth, ..])) => {
@@ -82,7 +82,8 @@ fn offset(reads: &[(usize, u64)], data: &[u8]) -> Result<u64, DemuxError> {
     read.map(|(_, from)| *from).ok_or(DemuxError::Order)
 }
 
-/// Reads since the last frame: the address that was read to, and the offset in the file. The demuxer does not tell it.
+/// Reads since the last frame: the address that was read to, and the offset in the file. The demuxer does not tell the
+/// offset of a frame.
 type Reads = Rc<RefCell<Vec<(usize, u64)>>>;
 
 struct Recorded<R> {

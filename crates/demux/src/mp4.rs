@@ -4,7 +4,8 @@ use crate::{DemuxError, Index, Sample, VP9};
 use re_mp4::{Mp4, StsdBoxContent, Track, TrackKind};
 use std::io::{Read, Seek};
 
-/// Of the matrix in a track's header, 16.16: how a picture is turned clockwise.
+/// The first two columns and rows of the matrix in a track's header, in 16.16 fixed point, and by how many degrees
+/// clockwise they turn the pictures.
 const TURNS: [([i32; 4], u16); 4] = {
     const ONE: i32 = 1 << 16;
     [
@@ -14,7 +15,7 @@ const TURNS: [([i32; 4], u16); 4] = {
         ([0, -ONE, ONE, 0], 270),
     ]
 };
-/// An edit that shows nothing for a while.
+/// The media time of an edit that shows nothing for a while: -1, in 32 or in 64 bits.
 const EMPTY: [u64; 2] = [u32::MAX as u64, u64::MAX];
 
 pub fn index<R: Read + Seek>(reader: R, size: u64) -> Result<Index, DemuxError> {
@@ -28,7 +29,7 @@ pub fn index<R: Read + Seek>(reader: R, size: u64) -> Result<Index, DemuxError> 
     let turn = TURNS.iter().find(|(turned, _)| *turned == matrix);
     let content = &trak.mdia.minf.stbl.stsd.contents;
     let codec = match content {
-        // Files are seen that tell no level.
+        // Some files tell no level.
         StsdBoxContent::Vp09(_) => Some(VP9.to_owned()),
         content => content.codec_string(),
     };
@@ -48,7 +49,7 @@ pub fn index<R: Read + Seek>(reader: R, size: u64) -> Result<Index, DemuxError> 
 fn samples(mp4: &Mp4, track: &Track, edit: &Edit) -> Result<Vec<Sample>, DemuxError> {
     let shifts = shifts(mp4, track);
     let sample = |(of, shift): (&re_mp4::Sample, i64)| {
-        // In a fragment a negative offset is told as that much below 2^32.
+        // A negative offset in a fragment comes as 2^32 plus the offset.
         let offset = (of.composition_timestamp - of.decode_timestamp) as i32;
         let shown = of.decode_timestamp + shift + i64::from(offset);
         let time = edit.delay + edit.micros(shown - edit.begin);
@@ -63,8 +64,8 @@ fn samples(mp4: &Mp4, track: &Track, edit: &Edit) -> Result<Vec<Sample>, DemuxEr
     track.samples.iter().zip(shifts).map(sample).collect()
 }
 
-/// How much later each sample is decoded than the ones before it say: a fragment tells when it begins, and `re_mp4`
-/// reads that of the first one only.
+/// How much later each sample is decoded than `re_mp4` says, by the durations of the samples before it: each fragment
+/// tells when it begins, and `re_mp4` reads the beginning of the first fragment only.
 fn shifts(mp4: &Mp4, track: &Track) -> Vec<i64> {
     let fragments = mp4.moofs.iter().flat_map(|moof| &moof.trafs);
     let fragments = fragments.filter(|traf| traf.tfhd.track_id == track.track_id);
@@ -92,11 +93,11 @@ fn shifts(mp4: &Mp4, track: &Track) -> Vec<i64> {
 /// The part of a track that is shown.
 struct Edit {
     timescale: i64,
-    /// When it begins, in microseconds.
+    /// When the part begins to be shown, in microseconds.
     delay: i64,
     /// The time in the track that is shown first. `composition_timestamp` counts from the track's first picture.
     begin: i64,
-    /// When it ends, in microseconds.
+    /// When the part ends, in microseconds.
     end: Option<i64>,
 }
 
@@ -136,7 +137,7 @@ impl Edit {
             [] => Ok(edit),
             [shown] if shown.media_rate == 1 && !EMPTY.contains(&shown.media_time) => {
                 edit.begin += shown.media_time.cast_signed();
-                // Zero is for all of it.
+                // A duration of zero means the rest of the track.
                 let duration = (shown.segment_duration > 0).then_some(shown.segment_duration);
                 edit.end = duration.map(|duration| edit.delay + micros(duration));
                 Ok(edit)

@@ -10,7 +10,7 @@ const H264: &str = "-c:v libx264 -preset veryfast -x264-params bframes=3:b-adapt
 const VP8: &str = "-c:v libvpx -deadline realtime";
 const VP9: &str = "-c:v libvpx-vp9 -deadline realtime -cpu-used 8";
 const FRAGMENTS: &str = "-movflags frag_keyframe+empty_moov+default_base_moof";
-/// Such fragments with pictures that are shown before they are decoded.
+/// Fragments with negative offsets: their pictures are shown before the time at which they are decoded.
 const NEGATIVE: &str = "-movflags frag_keyframe+empty_moov+negative_cts_offsets";
 const SOUND: &str = "-f lavfi -i sine=duration=2 -c:a aac";
 
@@ -21,7 +21,7 @@ struct Packet {
     crc32: u32,
 }
 
-/// A video of 50 frames; none are at a time that three divides, from the second on.
+/// A video of 50 frames without those, from the third on, whose number is divisible by three.
 fn made(folder: &Path, name: &str, options: &[&str]) -> PathBuf {
     let path = folder.join(name);
     let source = "-v error -f lavfi -i testsrc=size=128x96:rate=25:duration=2";
@@ -58,14 +58,14 @@ fn packets(path: &Path) -> Vec<Packet> {
         crc32: u32::from_str_radix(&fields[2]["CRC32:".len()..], 16).expect("a checksum"),
     };
     let lines = ffprobe(path, "packet=pts_time,flags,data_hash");
-    // Others are of what is beside a packet.
+    // Shorter lines tell of the side data of a packet.
     { lines.iter() }
         .filter(|line| line.len() >= 3)
         .map(packet)
         .collect()
 }
 
-/// What the index tells of them.
+/// What the index tells of the packets.
 fn of(index: &Index, path: &Path) -> Vec<Packet> {
     let bytes = std::fs::read(path).expect("it can be read");
     let packet = |it: &Sample| {
@@ -87,7 +87,7 @@ fn shown(index: &Index) -> Vec<i64> {
     times
 }
 
-/// Whether these are the same, but for what ffprobe rounds: to a microsecond.
+/// Whether the packets are the same; times may differ by the microsecond to which ffprobe rounds.
 fn agree(told: &[Packet], found: &[Packet]) -> bool {
     let near = |(one, other): (&Packet, &Packet)| {
         (one.time - other.time).abs() <= 1 && (one.is_key, one.crc32) == (other.is_key, other.crc32)
@@ -125,7 +125,8 @@ fn the_samples_of_each_kind_of_file_are_those_that_ffprobe_tells() {
     }
 }
 
-/// ffprobe counts such times from the first decoding, so they are compared with what was made.
+/// ffprobe counts the times of such files from the first decoding, so the index is compared with the times that the
+/// file was made with.
 #[test]
 #[ignore = "needs ffmpeg"]
 fn pictures_in_fragments_may_be_shown_before_they_are_decoded() {
@@ -138,7 +139,7 @@ fn pictures_in_fragments_may_be_shown_before_they_are_decoded() {
     assert_eq!(shown(&index), made.collect::<Vec<i64>>());
 }
 
-/// Lets the fragments after the first begin later.
+/// Makes the fragments after the first begin later.
 fn delay_fragments(path: &Path) {
     let mut bytes = std::fs::read(path).expect("it can be read");
     let boxes = bytes.windows(4).enumerate();
@@ -148,7 +149,7 @@ fn delay_fragments(path: &Path) {
         .collect();
     assert!(begins.len() >= 3, "{begins:?}");
     for begin in &begins[1..] {
-        // After the name, the version and the flags: 64 bits.
+        // The time has 64 bits, after the box's name, version and flags.
         let time = &mut bytes[begin + 8..begin + 16];
         let later = u64::from_be_bytes((&*time).try_into().expect("eight")) + 5000;
         time.copy_from_slice(&later.to_be_bytes());
@@ -156,7 +157,7 @@ fn delay_fragments(path: &Path) {
     std::fs::write(path, bytes).expect("it can be written");
 }
 
-/// Chrome records so: a fragment begins later than the one before it ends.
+/// Chrome records files in which a fragment begins later than the one before it ends.
 #[test]
 #[ignore = "needs ffmpeg"]
 fn a_fragment_tells_when_it_begins() {
@@ -175,7 +176,7 @@ fn a_turned_video_tells_how_far() {
     let path = made(folder.path(), "flat.mp4", &[H264]);
     let bytes = std::fs::read(path).expect("it can be read");
     let header = bytes.windows(4).position(|name| name == b"tkhd");
-    // Its version, flags, times, number, duration, layer, group and volume are before it.
+    // The box's version, flags, times, number, duration, layer, group and volume stand before the matrix.
     let matrix = header.expect("a track has a header") + 4 + 40;
     let turned = |a: i32, b: i32, c: i32, d: i32| {
         let mut bytes = bytes.clone();
@@ -199,7 +200,7 @@ fn a_trimmed_video_shows_what_is_left_of_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = made(folder.path(), "whole.mp4", &[H264]);
     let trimmed = folder.path().join("trimmed.mp4");
-    // From within a group of pictures: what is before is kept, and cut off by an edit list.
+    // Cut within a group of pictures: ffmpeg keeps the group's earlier pictures, and an edit list hides them.
     let status = Command::new("ffmpeg")
         .args(["-v", "error", "-ss", "0.8", "-i"])
         .arg(&path)
@@ -274,7 +275,7 @@ fn what_is_no_video_is_refused() {
     ));
 }
 
-/// `docs/upstream/re_mp4.md`: the index mends both.
+/// Two faults of `re_mp4` that the index mends (`docs/upstream/re_mp4.md`).
 #[test]
 #[ignore = "needs ffmpeg"]
 fn re_mp4_alone_misreads_fragments() {
@@ -311,7 +312,7 @@ fn re_mp4_alone_misreads_fragments() {
     );
 }
 
-/// `docs/upstream/matroska-demuxer.md`: the reader that it is given mends it.
+/// A fault of `matroska_demuxer` that its reader, `Buffered`, mends (`docs/upstream/matroska-demuxer.md`).
 #[test]
 #[ignore = "needs ffmpeg"]
 fn matroska_demuxer_alone_takes_an_unknown_size_for_one() {
@@ -323,11 +324,11 @@ fn matroska_demuxer_alone_takes_an_unknown_size_for_one() {
         .windows(4)
         .position(|name| name == cluster)
         .expect("it has a cluster");
-    // Its size as browsers write it that record: unknown, in eight bytes.
+    // The cluster's size as recording browsers write it: unknown, in eight bytes.
     let length = bytes[first + 4].leading_zeros() as usize + 1;
     let unknown = [0x01, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff];
     bytes.splice(first + 4..first + 4 + length, unknown);
-    // The places that the file tells of its parts are not theirs any more: it is a void in as many bytes.
+    // The seek head tells places that are no longer right, so it becomes a void element of the same length.
     let seek_head = [0x11, 0x4d, 0x9b, 0x74];
     let head = bytes.windows(4).position(|name| name == seek_head);
     let head = head.expect("it tells of its parts");

@@ -1,10 +1,10 @@
-//! NanoTrack alone, on annotated sequences in the layout of OTB: what it is without the particle filter.
+//! NanoTrack without the particle filter, on annotated sequences in the layout of OTB.
 //!
 //!     cargo run --release -p bagtrack-eval --example alone -- BACKBONE HEAD full|working DIR...
 //!
-//! `working` gives it the frames as a session has them, `full` as they are in the files. Prints for each sequence the
-//! mean overlap, the share of frames within 20 pixels, the milliseconds of a look, and with the variable BOXES set
-//! every box.
+//! With `working` NanoTrack gets the frames in a session's working size, with `full` as they are in the files. Prints
+//! for each sequence the mean overlap, the share of frames within 20 pixels, the milliseconds of a look, and with the
+//! variable BOXES set every box.
 
 use std::error::Error;
 use std::path::Path;

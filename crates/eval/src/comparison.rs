@@ -26,7 +26,7 @@ const HEADER: [&str; 8] = [
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Row {
     label: String,
-    /// What it sets.
+    /// The parameters that the variant sets.
     #[serde(serialize_with = "map")]
     set: Vec<Assignment>,
     center_error: f64,
@@ -52,7 +52,7 @@ fn map<S: Serializer>(set: &[Assignment], serializer: S) -> Result<S::Ok, S::Err
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     preset: Preset,
-    /// None where it is the default.
+    /// How the sequences were played; none where in the default way.
     #[serde(skip_serializing_if = "Option::is_none")]
     playback: Option<Playback>,
     seeds: usize,

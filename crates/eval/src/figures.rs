@@ -28,7 +28,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// The figures of one run; the counts of frames are not its own.
+    /// The figures of one run; its counts of frames are 0.
     fn of_run(run: &SeedRun) -> Self {
         let errors: Vec<f64> = run.scored.iter().map(|frame| frame.center_error).collect();
         let overlaps: Vec<f64> = run.scored.iter().map(|frame| frame.overlap).collect();
@@ -112,7 +112,7 @@ pub struct SeedMean {
 }
 
 impl SeedMean {
-    /// One for each seed; all sequences have the same seeds.
+    /// The means of each seed; all sequences have the same seeds.
     pub(super) fn all(sequences: &[SequenceRuns]) -> Vec<Self> {
         let seeds = sequences.iter().map(|s| s.seeds.len()).min().unwrap_or(0);
         let of_seed = |seed: usize| {
@@ -128,7 +128,7 @@ impl SeedMean {
         (0..seeds).map(of_seed).collect()
     }
 
-    /// That with the largest centre error; None of none.
+    /// The seed's means with the largest centre error; None where there are none.
     pub(super) fn worst(means: &[Self]) -> Option<Self> {
         means
             .iter()
@@ -147,7 +147,7 @@ pub struct ScoreFigures {
     pub ece: Option<f64>,
     /// The same, of chances learnt from the other sequences, 0 to 1. None (JSON null) with one sequence.
     pub ece_leave_one_out: Option<f64>,
-    /// Number of scored frames of all sequences and seeds, over which these are.
+    /// Number of scored frames of all sequences and seeds, over which the figures are taken.
     pub frames: usize,
 }
 

@@ -40,7 +40,7 @@ impl Isotonic {
                 hits: tied.iter().filter(|outcome| outcome.hit).count() as f64,
                 count: tied.len() as f64,
             };
-            // A block that is not above the one before it is one with it.
+            // A block whose rate is not above that of the block before it is pooled with that block.
             while let Some(before) = blocks.pop_if(|before| before.rate() >= block.rate()) {
                 block.lowest = before.lowest;
                 block.hits += before.hits;

@@ -132,7 +132,7 @@ fn run(args: Args) -> Result<(), Box<dyn Error>> {
     print(args.format, &comparison)
 }
 
-/// The preset alone, or what is to be set side by side; at least one.
+/// The preset alone or, with `--ablate`, the variants of the ablation; at least one.
 fn variants(args: &Args) -> Vec<Variant> {
     let mut variants = ablation::variants(&args.params.label());
     if !args.ablate {

@@ -13,7 +13,7 @@ use std::num::NonZeroUsize;
 /// How the frames of a sequence are played. The default is all of them, from the first to the last.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Playback {
-    /// From the last frame to the first.
+    /// Whether the frames are played from the last to the first.
     pub backwards: bool,
     /// The share of the frames, in the order in which they are played, that are passed over, 0 ≤ share < 1: frame i of
     /// n, counted from 0, is at i / n. The run starts at the first annotated frame that is there or later.

@@ -25,7 +25,7 @@ const HEADER: [&str; 9] = [
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     preset: Preset,
-    /// None where it is the default.
+    /// How the sequences were played; none where in the default way.
     #[serde(skip_serializing_if = "Option::is_none")]
     playback: Option<Playback>,
     seeds: usize,

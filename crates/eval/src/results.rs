@@ -1,8 +1,8 @@
 //! The answers of runs as text files, as the toolkits of OTB and pysot read them.
 //!
 //! A file for each sequence, named after it: `x,y,width,height` a line for each frame, the first one included. Boxes
-//! are 1-based, as in the sequence's own file. With several seeds each has a folder, `seed-0` and so on: these are the
-//! trackers to the toolkits.
+//! are 1-based, as in the sequence's own file. With several seeds each has a folder, `seed-0` and so on: the toolkits
+//! take each folder for a tracker.
 //!
 //! The figures of each scored frame go into one file: a line of JSON a frame.
 

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// A run cannot be done; the text names the sequence.
+/// Why a run cannot be done; the text names the sequence.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvalError {
@@ -51,12 +51,12 @@ pub struct ScoredFrame {
 /// The smallest overlap (intersection over union) of a hit.
 pub const HIT_OVERLAP: f64 = 0.5;
 
-/// The outcome of one scored frame of one run: what its score claimed, and what came.
+/// The outcome of one scored frame of one run: what its score claimed, and whether the box was a hit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
     /// The claimed probability of a hit, 0 to 1: the tracker's score, or a value fitted to it.
     pub score: f64,
-    /// Whether it was a hit.
+    /// Whether the box overlapped the annotated one by at least [`HIT_OVERLAP`].
     pub hit: bool,
 }
 
@@ -157,7 +157,7 @@ impl SeedRun {
 /// one job only, because parallel jobs compete for the processor. `expert` gives a second opinion, where there is one.
 ///
 /// # Errors
-/// See [`EvalError`]; of several, that of the lowest seed.
+/// See [`EvalError`]; of several errors, that of the lowest seed.
 pub fn run(
     sequence: &Sequence,
     params: &Params,

@@ -31,12 +31,12 @@ impl Sequence {
     /// Reads a sequence, from its first frame to its last.
     ///
     /// # Errors
-    /// As [`Self::load_played`]; a first frame without a box is one.
+    /// As [`Self::load_played`]; also a first frame without a box.
     pub fn load(dir: &Path, limits: &Limits) -> Result<Self, SequenceError> {
         Self::load_played(dir, Playback::default(), limits)
     }
 
-    /// Reads the frames of a sequence that are played, in that order.
+    /// Reads the frames of a sequence that `playback` plays, in the order in which it plays them.
     ///
     /// # Errors
     /// A missing or unreadable folder, file or frame; another number of boxes than frames; no box to start with.

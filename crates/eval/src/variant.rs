@@ -9,9 +9,9 @@ const PRESET: &str = "preset";
 /// A named change of parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Variant {
-    /// What a table calls it.
+    /// The variant's name in tables.
     pub label: String,
-    /// What it sets, in order. A first assignment of `preset` takes all parameters of that preset.
+    /// The parameters that it sets, in order. A first assignment of `preset` takes all parameters of that preset.
     pub assignments: Vec<Assignment>,
 }
 
@@ -19,7 +19,7 @@ impl Variant {
     /// The parameters of this variant of `base`, all in their ranges.
     ///
     /// # Errors
-    /// An assignment that is wrong.
+    /// An assignment names no parameter, or gives a value that the parameter cannot have.
     pub fn params(&self, base: &Params) -> Result<Params, AssignError> {
         match self.assignments.split_first() {
             Some(((name, value), rest)) if name == PRESET => {

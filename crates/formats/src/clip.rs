@@ -29,7 +29,7 @@ impl Clip {
         is_seen.then_some(Rect::new(x, y, right - x, bottom - y))
     }
 
-    /// The classes of the targets, in the order of the targets: those of one name are one.
+    /// The classes of the targets, in the order of the targets; targets of one name share a class.
     pub fn classes(&self) -> Vec<&str> {
         let mut classes: Vec<&str> = Vec::new();
         for name in &self.names {

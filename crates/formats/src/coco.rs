@@ -1,5 +1,5 @@
-//! COCO's JSON for object detection, with `videos`, `video_id`, `frame_id` and `track_id` as its kin for videos have
-//! them. Images and categories count from 1, frames from 0. Lost targets are left out.
+//! COCO's JSON for object detection, with `videos`, `video_id`, `frame_id` and `track_id` as in formats for video that
+//! derive from it. Images and categories count from 1, frames from 0. Lost targets are left out.
 
 use super::clip::{Clip, image_name};
 use super::row::Row;

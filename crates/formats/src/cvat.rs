@@ -1,5 +1,6 @@
-//! CVAT for video 1.1: a track for each target, with a key frame for each row. CVAT draws what lies between key frames,
-//! and shows a box until it is outside: where the target is lost, and after the last row where the video goes on.
+//! CVAT for video 1.1: a track for each target, with a key frame for each row. CVAT interpolates between key frames,
+//! and shows a box until a key frame is marked `outside`. So a key frame is `outside` where the target is lost, and
+//! after the last row where the video goes on.
 
 use super::clip::Clip;
 use super::row::Row;
@@ -65,13 +66,13 @@ fn key_frame(row: &Row, frame: u64, is_outside: bool) -> String {
     )
 }
 
-/// A text within an element or an attribute.
+/// `text` escaped for the content of an element or an attribute.
 fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for sign in text.chars() {
         match sign {
             '<' | '>' | '&' | '"' => escaped += &format!("&#{};", u32::from(sign)),
-            // XML has no control characters, and names of files may.
+            // XML allows no control characters, and names of files may have some.
             other if other.is_control() => escaped.push('\u{fffd}'),
             '\u{fffe}' | '\u{ffff}' => escaped.push('\u{fffd}'),
             other => escaped.push(other),

@@ -56,7 +56,7 @@ struct KeyFrame {
 /// The document of rows in the order of frames.
 pub fn document(clip: &Clip, rows: &[Row]) -> serde_json::Result<String> {
     let frames_count = Clip::length(rows);
-    // The last frame is shown as long as one is on average.
+    // The last frame is shown as long as a frame is on average.
     let last = rows
         .iter()
         .map(|row| seconds(clip, row))
@@ -83,8 +83,9 @@ pub fn document(clip: &Clip, rows: &[Row]) -> serde_json::Result<String> {
     }])
 }
 
-/// The key frames of a target. A key frame that is not enabled is shown itself, so it is the last one before the target
-/// is lost; where that was left out, as key frames leave out others, it is the first one in which it is.
+/// The key frames of a target. A key frame that is not enabled is itself shown, and nothing after it. So it is the last
+/// row before the target is lost; where the rows are key frames and that one was left out, it is the first row in which
+/// the target is lost.
 fn sequence(clip: &Clip, rows: &[Row], target: usize) -> Vec<KeyFrame> {
     let mut sequence: Vec<KeyFrame> = Vec::new();
     for row in rows.iter().filter(|row| row.target == target) {

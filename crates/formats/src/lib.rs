@@ -1,10 +1,10 @@
-//! Tracked boxes as the files that other tools read: one file of this crate a format.
+//! Tracked boxes as the files that other tools read: one module of this crate for each format.
 //!
 //! In: a [`Row`] for each target in each frame, and the [`Clip`] that they are of. Out: a line for each row, a
 //! document, or the texts of a folder. `text`, `json` and `csv` have 0-based pixels, as the service does, with the
-//! score and the status; the others are what the tools read that they are named after. `bagtrack track` writes them,
-//! and the service answers them (`POST /track?format=…`). The page saves the same (`web/save.js`), and
-//! `tools/exports.sh` lets the tools' own readers read all three.
+//! score and the status; the other formats are as the tools read them that they are named after. `bagtrack track`
+//! writes all formats, the service answers them (`POST /track?format=…`), and the page saves them (`web/save.js`);
+//! `tools/exports.sh` lets the tools' own readers read the files of all three.
 
 mod clip;
 mod coco;
@@ -79,10 +79,10 @@ impl ValueEnum for Format {
 /// What a format cannot say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Unfit {
-    /// It does not tell which target a box is of.
+    /// The format does not tell which target a box is of.
     #[error("otb has one target a file: take mot or csv, or track each box for itself")]
     Targets,
-    /// It does not say what is between two key frames.
+    /// The format does not say what is between two key frames.
     #[error("otb, coco and yolo have boxes of every frame: take another format for key frames")]
     KeyFrames,
 }
@@ -124,7 +124,7 @@ pub fn in_order(rows: &mut [Row]) -> &[Row] {
     rows
 }
 
-/// A text of a folder.
+/// A text file of a folder.
 #[derive(Debug)]
 pub struct TextFile {
     /// Its path in the folder, with slashes.
@@ -148,7 +148,7 @@ impl Format {
 }
 
 impl FileFormat {
-    /// The names of all.
+    /// The names of all formats of one file.
     pub fn names() -> impl Iterator<Item = String> {
         let values = Self::value_variants().iter();
         let values = values.filter_map(ValueEnum::to_possible_value);
@@ -183,7 +183,7 @@ impl FileFormat {
         }
     }
 
-    /// What it makes of rows.
+    /// What the format makes of rows.
     pub fn form(self) -> Form {
         match self {
             Self::Text => Form::Lines(Lines {

@@ -7,8 +7,8 @@ use super::clip::{Clip, image_name};
 use super::row::Row;
 use std::path::Path;
 
-/// Without `path` the folder of the file is meant, wherever it lies. Ultralytics does not train without `val`; were it
-/// the same frames, readers of annotations would have each box twice.
+/// Without `path` the folders are beside `data.yaml`, wherever it lies. Ultralytics does not train without `val`; if
+/// `val` named the same frames, readers of annotations would get each box twice.
 const BEGINNING: &str =
     "train: images/train\n# To train, add other frames to validate with: val: images/val\nnames:\n";
 
@@ -17,7 +17,7 @@ pub fn folder(clip: &Clip, rows: &[Row]) -> serde_json::Result<Vec<TextFile>> {
     let mut about = BEGINNING.to_owned();
     let classes = clip.classes();
     for (class, name) in classes.iter().enumerate() {
-        // A text of JSON is one of YAML.
+        // A JSON string is a YAML string.
         about += &format!("  {class}: {}\n", serde_json::to_string(name)?);
     }
     let of_frames = rows.chunk_by(|one, other| one.frame == other.frame);

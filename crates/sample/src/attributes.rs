@@ -2,7 +2,7 @@
 
 use super::error::SampleError;
 
-/// How hard a clip is. The default has none of it.
+/// How hard a clip is. By default a clip has none of these attributes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Attributes {
     /// Factor on both sides of the card, 0.05 to 2.
@@ -71,5 +71,5 @@ impl Attributes {
     }
 }
 
-/// See [`Attributes::camera_motion`].
+/// The greatest [`Attributes::camera_motion`].
 pub(super) const MAX_CAMERA_MOTION: f64 = 0.25;

@@ -14,7 +14,7 @@ const SAMPLES: u32 = 4;
 /// Standard deviation of the sensor's noise, of 255.
 const NOISE: f64 = 2.5;
 
-/// Moments at which a blurred frame is seen.
+/// Moments of which a blurred frame is the mean.
 const EXPOSURES: u32 = 8;
 
 /// The wall, which does not move, drawn once, with as much around the frame as the camera may show.
@@ -44,7 +44,7 @@ impl Background {
         }
     }
 
-    /// The frame where the camera has moved the picture so far.
+    /// The wall in the frame when the camera has moved the picture by so many pixels to the right and down.
     fn seen(&self, settings: Settings, (right, down): (i32, i32)) -> Vec<Color> {
         let [left, top] = [self.margin - right, self.margin - down].map(|at| at as usize);
         let rows = self.pixels.chunks_exact(self.width).skip(top);
@@ -102,7 +102,7 @@ fn exposed(
     mean
 }
 
-/// What is seen so long before a frame, as a share of the time between two.
+/// What is seen `before` the moment of a frame; `before` is a share of the time between two frames.
 fn seen(
     settings: Settings,
     timeline: &Timeline,

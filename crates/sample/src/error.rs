@@ -6,7 +6,7 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SampleError {
-    /// There are too few frames, or a side is out of its range.
+    /// The number of frames, a side of the frame or an attribute is out of its range.
     #[error("{name} is {value}; it must be {expected}")]
     Setting {
         /// Name of the setting.

@@ -9,10 +9,10 @@ const JPEG_QUALITY: u8 = 92;
 /// How frames are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Format {
-    /// Small; the pictures lose a little.
+    /// Small files; the compression loses a little.
     #[default]
     Jpeg,
-    /// Exact.
+    /// Larger files, without loss.
     Png,
 }
 
@@ -27,7 +27,7 @@ impl Format {
     /// The bytes of a file with this picture.
     ///
     /// # Errors
-    /// What the encoder says.
+    /// The encoder's error.
     pub fn encode(self, picture: &RgbImage) -> ImageResult<Vec<u8>> {
         let mut bytes = Vec::new();
         match self {

@@ -35,7 +35,7 @@ impl Pose {
         )
     }
 
-    /// Where a point of the frame is on the card, each coordinate 0 to 1; none beside it.
+    /// Where a point of the frame is on the card, each coordinate 0 to 1; none beside the card.
     pub(super) fn on_card(&self, x: f64, y: f64) -> Option<(f64, f64)> {
         let (sine, cosine) = self.angle.sin_cos();
         let (right, down) = (x - self.center.0, y - self.center.1);
@@ -44,7 +44,7 @@ impl Pose {
         ((0.0..1.0).contains(&u) && (0.0..1.0).contains(&v)).then_some((u, v))
     }
 
-    /// The pose so far on the way from this one to `other`.
+    /// The pose at `share` (0 to 1) of the way from this pose to `other`.
     pub(super) fn towards(&self, other: &Self, share: f64) -> Self {
         let between = |from: f64, to: f64| from + (to - from) * share;
         let both =

@@ -17,7 +17,7 @@ pub enum Scene {
 }
 
 impl Scene {
-    /// The least number of frames: the target must be in full sight before and after.
+    /// The least number of frames: the target must be in full sight before and after it is out of sight.
     pub fn min_frames(self) -> u32 {
         match self {
             Scene::Default => 1,

@@ -12,7 +12,7 @@ pub const MAX_SIDE: u32 = 4096;
 /// What the clip is to be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// What happens.
+    /// What happens to the target.
     pub scene: Scene,
     /// Number of frames, [`Scene::min_frames`] or more.
     pub frames: u32,
@@ -22,7 +22,7 @@ pub struct Settings {
     pub height: u32,
     /// Chooses the path, the textures and the noise.
     pub seed: u64,
-    /// What makes it hard.
+    /// What makes the clip hard.
     pub attributes: Attributes,
 }
 

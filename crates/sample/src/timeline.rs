@@ -42,13 +42,13 @@ impl Timeline {
         self.posed(area, index)
     }
 
-    /// How the cards lie that look like it.
+    /// How the cards lie that look like the target.
     pub(super) fn similar(&self, index: u32) -> impl Iterator<Item = Pose> {
         let others = 1..=self.course.settings.attributes.similar_objects;
         others.map(move |number| self.posed(default::on_path(&self.course, index, number), index))
     }
 
-    /// A card there, as it is turned and as the camera sees it.
+    /// The pose of a card at `area` of the scene, turned, and moved as the camera moves the picture.
     fn posed(&self, area: Rect, index: u32) -> Pose {
         let degrees = self.course.settings.attributes.in_plane_rotation * f64::from(index);
         Pose {

@@ -7,12 +7,12 @@ pub enum ModelError {
     /// A file is no ONNX file, or a damaged one.
     #[error("it is not an ONNX file that can be read: {0}")]
     NotOnnx(&'static str),
-    /// An operation that is not known here, or a use of one.
+    /// The network has an operation that is not known here, or uses one in a way that is not.
     #[error("its operation {kind} cannot be run here: {reason}")]
     Operation {
         /// The name that ONNX gives the operation.
         kind: String,
-        /// What about it.
+        /// Why the operation cannot be run.
         reason: &'static str,
     },
     /// The network runs, but it is not that of the tracker that was named.

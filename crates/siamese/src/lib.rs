@@ -1,9 +1,9 @@
 //! Siamese tracking networks as experts beside the tracker: [`NanoTrack`].
 //!
-//! The user gives the network as ONNX files; no weights are part of this crate. What a file may hold is little: the
-//! operations of small convolutional networks over one image (`network`). They run on one thread, on any machine.
+//! The user gives the network as ONNX files; no weights are part of this crate. A file may hold only the operations of
+//! small convolutional networks over one image (`network`). The networks run on one thread, on any machine.
 //!
-//! | room | holds |
+//! | module | holds |
 //! |---|---|
 //! | `onnx` | the graph in a file |
 //! | `network` | a graph that runs |

@@ -44,12 +44,13 @@ fn a_network_of_fixed_weights_follows_a_colour() {
     for t in 1..20 {
         let seen = network.look(&frame(&target(t)), &template, &place);
         let distance = seen.target.center_distance(&target(t));
-        // Its grid has 16 pixels of the picture, some 12 of the frame, and the middle of its window counts most.
+        // Places of the head's grid are 16 pixels of the picture apart, some 12 of the frame, and the middle counts
+        // most.
         assert!(distance < 18.0, "frame {t}: {distance}");
         assert!(seen.score > 0.7, "frame {t}: {}", seen.score);
         place = seen.target;
     }
-    // Nothing of it is left: the score says so.
+    // The target is gone, and the score is low.
     let empty = frame(&Rect::new(-900.0, 0.0, 10.0, 10.0));
     let seen = network.look(&empty, &template, &place);
     assert!(seen.score < 0.3, "{}", seen.score);
@@ -110,7 +111,7 @@ fn what_is_no_such_network_is_refused_with_the_reason() {
     ));
     let unknown = refusal(&tiny_network::of_operation("LSTM"), &head);
     assert!(unknown.to_string().contains("LSTM"), "{unknown}");
-    // A picture as it is has three channels, where the head was made for four.
+    // An unchanged picture has three channels; the head takes four.
     let unfit = refusal(&tiny_network::of_operation("Relu"), &head);
     assert!(matches!(unfit, ModelError::Operation { .. }), "{unfit}");
     for len in 0..backbone.len() {
@@ -124,7 +125,7 @@ fn what_is_no_such_network_is_refused_with_the_reason() {
 fn the_same_files_have_the_same_fingerprint() {
     let (backbone, mut head) = (tiny_network::backbone(), tiny_network::head());
     assert_eq!(tiny().fingerprint(), tiny().fingerprint());
-    // A field that is passed over.
+    // A field that the parser passes over.
     head.extend([8, 7]);
     let other = NanoTrack::from_onnx(&backbone, &head).unwrap();
     assert_ne!(other.fingerprint(), tiny().fingerprint());

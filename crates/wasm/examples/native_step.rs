@@ -1,5 +1,5 @@
-//! What a step takes on this machine without WebAssembly, on the sample clip in 640 x 480: `tools/wasm_step.sh` runs it
-//! beside the module. Frames are taken as the service takes them, decoded and in full size.
+//! How long a step takes on this machine without WebAssembly, on the sample clip in 640 x 480: `tools/wasm_step.sh`
+//! runs it beside the module. Frames are taken as the service takes them, decoded and in full size.
 
 use bagtrack_sample::{Clip, Settings};
 use bagtrack_tracker::{Frame, Preset, Tracker};

@@ -3,7 +3,7 @@
 use bagtrack_tracker::{Diagnostics, Estimate, Rect, Status};
 use wasm_bindgen::prelude::*;
 
-/// Particles that are told of: the likeliest ones.
+/// The most particles in a [`WasmSeen`]: the likeliest ones.
 const MOST_PARTICLES: usize = 200;
 
 /// The answer to a frame.

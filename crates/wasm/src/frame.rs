@@ -18,7 +18,7 @@ impl WasmFrame {
     #[wasm_bindgen(js_name = fromRgba)]
     pub fn from_rgba(width: u32, height: u32, rgba: &[u8]) -> Result<WasmFrame, JsError> {
         let is_opaque = |pixel: &[u8; 4]| pixel[3] == 255;
-        // Pictures of videos have nothing transparent.
+        // Frames of videos have no transparent pixels and need no copy.
         if rgba.as_chunks::<4>().0.iter().all(is_opaque) {
             return made(Frame::from_rgbx(width, height, rgba));
         }

@@ -7,11 +7,11 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
 
-/// Width of the card by its height.
+/// Width of the card divided by its height.
 const ASPECT: f64 = 0.8;
 /// The streams of random numbers of the camera begin here, after those of the sensor's noise.
 const CAMERA: u64 = 1 << 40;
-/// Height of the card by the shorter side of the frame, at the start and at the end.
+/// Height of the card divided by the shorter side of the frame, at the start and at the end.
 const HEIGHT: (f64, f64) = (0.24, 0.36);
 
 /// The settings of a clip, and what follows from them in every scene.
@@ -53,7 +53,7 @@ impl Course {
         let (width, height) = self.size();
         let grown = smoothstep(self.progress(index));
         let attributes = &self.settings.attributes;
-        // A ratio of sizes grows evenly by its logarithm.
+        // A ratio of sizes grows evenly if its logarithm does.
         let factor = attributes.low_resolution * attributes.scale_variation.powf(grown);
         let card = width.min(height) * (HEIGHT.0 + (HEIGHT.1 - HEIGHT.0) * grown);
         let turned = (PI * self.progress(index)).sin();

@@ -7,7 +7,8 @@ use std::f64::consts::TAU;
 
 /// Frames that the path takes to come back in x and in y: about 4 pixels a frame at 320 x 240.
 const PERIOD: (f64, f64) = (140.0, 97.0);
-/// Of a turn, between two cards that look alike: less than a half by the golden ratio, so that none come together.
+/// The phase between two cards that look alike, as a share of a turn: 1 - 1 / φ with the golden ratio φ, so that no two
+/// come together.
 const APART: f64 = 0.381_966_011_250_105;
 /// Shares of the clip's length between which it is dim, and between which the card is half covered.
 const DIM: (f64, f64) = (0.25, 0.48);

@@ -7,12 +7,12 @@ use std::f64::consts::{PI, TAU};
 
 /// Frames for which nothing of the card is seen, an odd number.
 const AWAY: f64 = 25.0;
-/// Frames from its start to the left to where it stays in the end, if the clip is long enough: at most 4 pixels a
-/// frame to the side, at 320 x 240.
+/// Frames from where the card starts to where it comes to rest, if the clip is long enough: at most 4 pixels a frame to
+/// the side, at 320 x 240.
 const WAY: f64 = 150.0;
-/// Where the way starts and ends, by the width of the frame.
+/// Where the card's left edge is at the start and at the end, as a share of the frame's width.
 const START: f64 = 0.4;
-/// Frames in which it goes from one height to the other.
+/// Frames in which the card goes from one height to the other.
 const CLIMB: f64 = 40.0;
 /// Frames from one small rise and fall to the next.
 const SWAY: f64 = 43.0;

@@ -26,8 +26,8 @@ pub(crate) struct Square {
     pub side: f64,
 }
 
-/// `square` of `frame` in `pixels` times `pixels`, blue, green and red from 0 to 255 as the authors'
-/// own programs have them; beyond the edge `beyond`, given as luma and chroma.
+/// The `square` of `frame`, resampled to `pixels` x `pixels`: blue, green and red from 0 to 255, as in the programs of
+/// NanoTrack's authors. Beyond the frame's edge the picture has the colour `beyond`, given as luma and chroma.
 pub(crate) fn crop(frame: &Frame, square: &Square, pixels: usize, beyond: [f32; 3]) -> Tensor {
     let size = (frame.width(), frame.height());
     let area = pixels * pixels;
@@ -53,7 +53,7 @@ pub(crate) fn crop(frame: &Frame, square: &Square, pixels: usize, beyond: [f32; 
     }
 }
 
-/// Two neighbours on a line, and the share of the second; a place beyond the line has none.
+/// Two neighbouring pixels on a line, and the share of the second; none for a pixel beyond the line.
 #[derive(Debug, Clone, Copy)]
 struct Between {
     places: [Option<usize>; 2],
@@ -82,13 +82,14 @@ impl Between {
     }
 }
 
-/// Fills `channel` with the square of a plane of `size`, linearly between its pixels.
+/// Fills `channel` with the square of a plane of `size`, interpolated bilinearly.
 fn resample(plane: &[u8], size: (u32, u32), square: &Square, beyond: f32, channel: &mut [f32]) {
     let pixels = channel.len().isqrt();
     let columns = Between::along(square.center.0, square.side, pixels, size.0);
     let rows = Between::along(square.center.1, square.side, pixels, size.1);
     let width = size.0 as usize;
-    // A row of the plane between two, as far as the square reaches; one value beyond each end.
+    // A row interpolated between two rows of the plane, as far as the square reaches. Its last values stay `beyond`,
+    // for pixels beyond the plane.
     let inside = columns.iter().flat_map(|column| column.places).flatten();
     let (first, last) = inside.fold((usize::MAX, 0), |(first, last), place| {
         (first.min(place), last.max(place))
@@ -114,7 +115,7 @@ fn resample(plane: &[u8], size: (u32, u32), square: &Square, beyond: f32, channe
     }
 }
 
-/// The row between two; beyond the plane it has the value `beyond`.
+/// Fills `line` with the row between the two of `pair`; a row beyond the plane has the value `beyond`.
 fn blend(pair: [Option<&[u8]>; 2], share: f32, beyond: f32, line: &mut [f32]) {
     match pair {
         [Some(upper), Some(lower)] => {

@@ -1,4 +1,4 @@
-//! The box in what the head says.
+//! From the answer of the network's head to a box.
 
 use bagtrack_tracker::{Rect, Sighting};
 
@@ -21,7 +21,7 @@ pub(crate) struct Weighing {
 }
 
 impl Weighing {
-    /// That of the network whose head has a grid of `places` on each side.
+    /// The weighing for the network whose head has a grid of `places` on each side.
     pub fn of_grid(places: usize) -> Self {
         match places {
             // NanoTrack v3.
@@ -40,7 +40,7 @@ impl Weighing {
     }
 }
 
-/// The side of a square that has the box and, around it, half of the mean of its sides on each side.
+/// The side of the square with the area of the box grown, on each side, by half of the mean of its sides.
 pub(crate) fn context_side(width: f64, height: f64) -> f64 {
     let margin = (width + height) / 2.0;
     ((width + margin) * (height + margin)).sqrt()
@@ -56,7 +56,8 @@ struct Prediction {
 }
 
 /// The box that the head's answer speaks for: `classes` and `edges` are its two outputs, `place` is the last box, and
-/// `scale` the pixels of the search picture to one of the frame. None where the outputs are not those of such a head.
+/// `scale` the number of pixels of the search picture along one of the frame. None where the outputs are not those of
+/// such a head.
 pub(crate) fn decode([classes, edges]: [&Tensor; 2], place: &Rect, scale: f64) -> Option<Sighting> {
     let (2, places, columns) = classes.image()? else {
         return None;
@@ -113,7 +114,7 @@ pub(crate) fn decode([classes, edges]: [&Tensor; 2], place: &Rect, scale: f64) -
     })
 }
 
-/// How much a box differs from the last one in size and shape, times each other; 1 where in neither.
+/// The ratio of a box's size to that of the last box, times the ratio of their shapes, each taken as at least 1.
 fn change(size: (f64, f64), last: (f64, f64)) -> f64 {
     let ratio = |ratio: f64| ratio.max(1.0 / ratio);
     let by_size = ratio(context_side(size.0, size.1) / context_side(last.0, last.1));

@@ -2,11 +2,11 @@
 //! compares both, and says for each place of a grid whether the target is there and how far its edges are.
 //!
 //! - `crop`: the picture that the network gets, out of a frame.
-//! - `decode`: the box in what the head says.
+//! - `decode`: from the head's answer to a box.
 //! - `tracker`: both networks as an [`Expert`](bagtrack_tracker::Expert).
 //!
 //! In: frames and boxes in their pixels. Out: boxes and scores. What can go wrong: files that are no NanoTrack, which
-//! is told when they are loaded.
+//! are refused when they are loaded.
 
 mod crop;
 mod decode;

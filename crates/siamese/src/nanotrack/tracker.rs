@@ -1,4 +1,4 @@
-//! Both networks as an expert.
+//! Backbone and head together, as an expert.
 
 use std::cell::RefCell;
 
@@ -13,7 +13,7 @@ use crate::network::plan::Plan;
 use crate::network::tensor::Tensor;
 use crate::onnx::model::Graph;
 
-/// Sides of the pictures of the target and of the search area.
+/// Sides of the pictures of the target and of the search area, in pixels.
 const TARGET_PIXELS: usize = 127;
 const SEARCH_PIXELS: usize = 255;
 
@@ -38,7 +38,8 @@ impl NanoTrack {
     /// The network in two ONNX files: `backbone` describes pictures, `head` compares two descriptions.
     ///
     /// # Errors
-    /// Bytes that are not ONNX, hold operations that are not known here, or are no such networks. Both are tried.
+    /// Bytes that are not ONNX, hold operations that are not known here, or are no such networks. Both networks are run
+    /// once to find out.
     pub fn from_onnx(backbone: &[u8], head: &[u8]) -> Result<Self, ModelError> {
         let mut network = Self {
             fingerprint: xxh3_64(backbone) ^ xxh3_64(head).rotate_left(1),

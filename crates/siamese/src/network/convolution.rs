@@ -84,8 +84,8 @@ impl Shape {
         )
     }
 
-    /// Of the results along a side of `size` pixels with `pad` zeros before it those for which the kernel's pixel `at`
-    /// lies in the image.
+    /// The results for which the kernel's pixel `at` lies in the image, of `results` along a side of `size` pixels with
+    /// `pad` zeros before it.
     fn inside(&self, at: usize, pad: usize, size: usize, results: usize) -> Range<usize> {
         let first = pad.saturating_sub(at).div_ceil(self.stride);
         let end = (size + pad).saturating_sub(at).div_ceil(self.stride);
@@ -93,8 +93,8 @@ impl Shape {
     }
 }
 
-/// All channels into each output: for each pixel of the kernel and each channel a row of what it meets, and one
-/// product.
+/// All channels into each output: for each channel and each pixel of the kernel a row of the image's pixels that it
+/// meets, and one matrix product with these rows (im2col).
 fn over_all(
     image: &Tensor,
     weights: &[f32],
@@ -127,7 +127,8 @@ fn over_all(
     memory.give_back(met);
 }
 
-/// What the pixel `(ky, kx)` of the kernel meets, for each result; 0 outside of the image.
+/// Fills `meets`, which is 0, with the pixels of the image that the kernel's pixel `(ky, kx)` meets, one for each
+/// result.
 fn gather(channel: &[f32], shape: &Shape, (ky, kx): (usize, usize), meets: &mut [f32]) {
     let (rows, columns) = shape.result();
     let within = shape.inside(kx, shape.pads.1, shape.size.1, columns);
@@ -172,7 +173,7 @@ fn by_channel(
     memory.give_back(padded);
 }
 
-/// Writes a row of the image where the row of each phase begins, `at`.
+/// Writes a row of the image into the row of each phase, which begins at `at`.
 fn spread(pixels: &[f32], shape: &Shape, padded: &mut [f32], phase: usize, at: usize) {
     let left = shape.pads.1;
     if shape.stride == 1 {

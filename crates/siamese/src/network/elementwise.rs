@@ -2,8 +2,8 @@
 
 use super::tensor::Tensor;
 
-/// How the numbers of a smaller tensor are repeated beside those of a larger one: each `run` times, and all of them
-/// again and again.
+/// How the numbers of a smaller tensor are repeated beside those of a larger one: each of them stands beside `run`
+/// numbers in a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Broadcast {
     run: usize,
@@ -59,7 +59,7 @@ pub(crate) fn average(of: &Tensor) -> Result<Tensor, &'static str> {
     let (channels, height, width) = of.image().ok_or("its input is no image")?;
     let planes = of.values.chunks_exact((height * width).max(1));
     let mean = |plane: &[f32]| {
-        // Eight sums at once: one would wait for itself.
+        // Eight sums at once: in a single sum each addition would wait for the one before.
         let (parts, rest) = plane.as_chunks::<8>();
         let mut sums = [0.0; 8];
         for part in parts {
@@ -101,7 +101,7 @@ pub(crate) fn reshaped(mut of: Tensor, shape: &[i64]) -> Result<Tensor, &'static
     Ok(of)
 }
 
-/// The sides in another order; without one, reversed.
+/// The tensor with its sides in another `order`; without an order, reversed.
 pub(crate) fn transposed(of: &Tensor, order: &[usize]) -> Result<Tensor, &'static str> {
     let order: Vec<usize> = match order {
         [] => (0..of.shape.len()).rev().collect(),

@@ -1,7 +1,7 @@
 //! Buffers that are used again: a run makes some hundred tensors of a few hundred kilobytes, and fresh memory for each
 //! would cost as much as a layer.
 
-/// No more buffers are kept: a network has fewer tensors at once.
+/// The most buffers that are kept: a network has fewer tensors at once.
 const MAX_FREE: usize = 16;
 
 /// Free buffers.
@@ -13,7 +13,7 @@ pub(crate) struct Memory {
 impl Memory {
     /// `len` numbers, all of them `value`.
     pub fn filled(&mut self, len: usize, value: f32) -> Vec<f32> {
-        // The smallest that is large enough, else the largest.
+        // The smallest buffer that is large enough, else the largest.
         let fits = |buffer: &Vec<f32>| buffer.capacity() >= len;
         let free = self.free.iter().enumerate();
         let best = free.min_by_key(|(_, buffer)| match fits(buffer) {
@@ -29,7 +29,7 @@ impl Memory {
         buffer
     }
 
-    /// Takes `buffer` back. Of too many the smallest is let go: that of a large tensor costs most to make.
+    /// Takes `buffer` back. Of too many buffers the smallest is freed: a large one costs most to make.
     pub fn give_back(&mut self, buffer: Vec<f32>) {
         self.free.push(buffer);
         if self.free.len() > MAX_FREE {

@@ -14,7 +14,7 @@ use crate::onnx::model::{Attribute, Graph, Node};
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Plan {
     steps: Vec<Step>,
-    /// Weights, sizes and indices, each where the steps look for it.
+    /// Weights, sizes and indices, each in the slot where the steps look for it.
     constants: Vec<Slot>,
     inputs: Vec<usize>,
     outputs: Vec<usize>,
@@ -28,7 +28,7 @@ struct Step {
     /// None for an input that is left out.
     inputs: Vec<Option<usize>>,
     output: usize,
-    /// What no later step takes.
+    /// The slots that no later step takes.
     spent: Vec<usize>,
 }
 
@@ -103,7 +103,7 @@ impl Plan {
         }
     }
 
-    /// The outputs for these inputs, in the order of the graph's.
+    /// The outputs for these inputs, in the order of the graph's outputs.
     pub fn run(&self, inputs: Vec<Tensor>, memory: &mut Memory) -> Result<Vec<Tensor>, ModelError> {
         let mut computed = vec![Slot::Empty; self.constants.len()];
         if inputs.len() != self.inputs.len() {
@@ -179,7 +179,7 @@ impl Step {
     }
 }
 
-/// One step of a run. What it refuses is told by the reason alone.
+/// One step of a run. Its errors are reasons alone, without the operation's name.
 struct Run<'a> {
     step: &'a Step,
     constants: &'a [Slot],
@@ -203,7 +203,7 @@ impl Run<'_> {
         self.slot(input).and_then(Slot::tensor).ok_or(NO_TENSOR)
     }
 
-    /// A list of numbers that is known beforehand; none where the input is left out.
+    /// A list of integers that is a constant of the graph; none where the input is left out.
     fn integers(&self, input: usize) -> Result<Option<Vec<i64>>, &'static str> {
         match self.slot(input) {
             None => Ok(None),

@@ -1,7 +1,7 @@
 //! Matrix products, by nalgebra's kernel.
 //!
-//! nalgebra keeps columns together, tensors keep rows together; so a tensor of r rows and c columns is there its own
-//! transpose, and A · B is computed as Bᵀ · Aᵀ.
+//! nalgebra keeps columns together, tensors keep rows together; so nalgebra sees a tensor as its transpose, and A · B
+//! is computed as Bᵀ · Aᵀ.
 
 use nalgebra::{DMatrixView, DMatrixViewMut};
 
@@ -20,7 +20,7 @@ pub(crate) fn add_product(
     sum.gemm(1.0, &second, &first, 1.0);
 }
 
-/// The product of a row and a matrix, plus the bias: a layer in which everything is connected.
+/// The product of a row and a matrix, plus the bias: a fully connected layer.
 pub(crate) fn gemm(
     row: &Tensor,
     matrix: &Tensor,
