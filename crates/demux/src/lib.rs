@@ -66,13 +66,13 @@ pub enum DemuxError {
     /// The file has no pictures, or none of them is shown.
     #[error("the file has no pictures")]
     NoPictures,
-    /// No browser decodes its pictures, or they are packed in a way that is not known here.
+    /// No browser decodes the pictures, or they are packed in a way that is not known here.
     #[error("pictures as {0} are not known")]
     Codec(String),
-    /// Its pictures are mirrored or skewed.
+    /// The pictures are mirrored or skewed.
     #[error("the pictures are not only turned by quarters")]
     Turned,
-    /// Parts of it are repeated, left out or shown at another speed.
+    /// Parts of the track are repeated, left out or shown at another speed.
     #[error("the file shows more than one part of its track")]
     Edited,
     /// Two pictures have the same time, or the first one needs another one.

@@ -145,7 +145,8 @@ pub struct ScoreFigures {
     pub roc_auc: Option<f64>,
     /// Expected calibration error of the score in ten bins, 0 to 1.
     pub ece: Option<f64>,
-    /// The same, of chances learnt from the other sequences, 0 to 1. None (JSON null) with one sequence.
+    /// Expected calibration error of chances learnt from the other sequences, 0 to 1. None (JSON null) with one
+    /// sequence.
     pub ece_leave_one_out: Option<f64>,
     /// Number of scored frames of all sequences and seeds, over which the figures are taken.
     pub frames: usize,

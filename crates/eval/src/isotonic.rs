@@ -21,7 +21,7 @@ impl Block {
 /// The fit: a chance of a hit for every score.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Isotonic {
-    /// By rising score, with strictly rising rates; never empty.
+    /// The blocks by rising score, with strictly rising rates; never empty.
     blocks: Vec<Block>,
 }
 

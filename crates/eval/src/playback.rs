@@ -39,7 +39,7 @@ const SHIFTS: [(f64, f64); 8] = [
 const SCALES: [f64; 4] = [1.0, -1.0, 2.0, -2.0];
 
 impl Playback {
-    /// This, unless it is the default.
+    /// This playback, unless it is the default.
     pub(super) fn unusual(self) -> Option<Self> {
         (self != Self::default()).then_some(self)
     }

@@ -3,16 +3,16 @@
 /// What happens to the target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Scene {
-    /// It moves in smooth turns, comes nearer, passes through a dim spell, and is half covered for a while. It is
-    /// always in sight.
+    /// The target moves in smooth turns, comes nearer, passes through a dim spell, and is half covered for a while. It
+    /// is always in sight.
     #[default]
     Default,
-    /// It passes behind a broad post that stands from the top of the frame to the bottom: for 20 frames in the middle
-    /// of the clip nothing of it is seen, and it comes out on the other side. The post does not move, so nothing tells
-    /// where the target is behind it.
+    /// The target passes behind a broad post that stands from the top of the frame to the bottom: for 20 frames in the
+    /// middle of the clip nothing of it is seen, and it comes out on the other side. The post does not move, so nothing
+    /// tells where the target is behind it.
     Covered,
-    /// It leaves the frame at one side: for 25 frames in the middle of the clip nothing of it is seen, and it comes
-    /// back at the same side, but higher or lower by about two of its heights.
+    /// The target leaves the frame at one side: for 25 frames in the middle of the clip nothing of it is seen, and it
+    /// comes back at the same side, but higher or lower by about two of its heights.
     Leaves,
 }
 

@@ -70,8 +70,7 @@ impl Segment {
 }
 
 impl<T> KeyFrames<T> {
-    /// Key frames between which an interpolated edge may be off by `tolerance` pixels; a negative tolerance counts as
-    /// 0.
+    /// Key frames between which an interpolated edge may be off by `tolerance` pixels; a tolerance below 0 counts as 0.
     pub fn new(tolerance: f64) -> Self {
         Self {
             tolerance: tolerance.max(0.0),
@@ -121,8 +120,8 @@ impl<T> KeyFrames<T> {
         found.into_iter().flatten()
     }
 
-    /// Ends the track and gives its last box, which is a key frame, unless it was given already. A box pushed
-    /// afterwards begins another track.
+    /// Ends the track and gives the row of its last box, which is a key frame, unless that was given already. A box
+    /// pushed afterwards begins another track.
     pub fn finish(&mut self) -> Option<T> {
         self.segment = None;
         mem::take(&mut self.last).map(|(_, row)| row)

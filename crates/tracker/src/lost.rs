@@ -1,8 +1,8 @@
 //! Where the box of a lost target goes.
 //!
-//! That a target is lost is decided elsewhere; here is decided where its box goes. A target in full view that has
-//! turned away may count as lost, yet its place still resembles it more than any place nearby. So the box follows the
-//! particles where these speak for it, else the target's colours, else the camera's motion.
+//! Whether a target is lost is decided by the update gate. A target in full view that has turned away may count as
+//! lost, yet its place still resembles it more than any place nearby. So the box follows the particles where these
+//! speak for it, else the target's colours, else the camera's motion.
 
 use crate::image::frame::Frame;
 use crate::motion::particles::Particle;

@@ -6,7 +6,7 @@ use crate::input::MIN_BOX_SIDE;
 
 /// A box with more than this share of its area outside is warned of.
 const MAX_OUTSIDE: f64 = 0.5;
-/// The same, where it reads well as two corners.
+/// The same, for a box whose numbers may well be two corners.
 const MAX_OUTSIDE_AS_CORNERS: f64 = 0.01;
 
 /// Width and height of a frame in pixels.
@@ -179,11 +179,11 @@ mod tests {
     fn a_box_that_may_be_meant_is_taken_and_one_far_outside_warned_of() {
         for (sides, warned) in [
             ([20.0, 15.0, 16.0, 12.0], None),
-            // It enters the frame.
+            // The target enters the frame.
             ([630.0, 100.0, 40.0, 60.0], Some("75 %")),
             ([-30.0, 100.0, 40.0, 60.0], Some("75 %")),
             ([620.0, 100.0, 25.0, 60.0], None),
-            // Two corners, but a box that hardly leaves the frame, too.
+            // Two corners, but as a box the numbers hardly leave the frame.
             ([298.0, 160.0, 346.0, 240.0], Some("`box=298,160,48,80`")),
             ([0.0, 0.0, 640.0, 480.0], None),
         ] {
@@ -201,13 +201,13 @@ mod tests {
     #[test]
     fn each_bound_of_a_likely_mistake_holds_by_itself() {
         let told = |sides| check_box(&rect(sides), SIZE).map_err(|error| error.to_string());
-        // A side of nothing is the tracker's to refuse.
+        // A side of 0 is refused by the tracker, not here.
         for sides in [[50.0, 50.0, 0.0, 30.0], [50.0, 50.0, 30.0, 0.0]] {
             assert_eq!(told(sides), Ok(()), "{sides:?}");
         }
         let negative = told([50.0, 50.0, 0.0, -30.0]).unwrap_err();
         assert!(negative.contains("negative height"), "{negative}");
-        // One number is too large for a fraction, or none is a side.
+        // One number is too large for a fraction, or a side is 0.
         for sides in [
             [0.0, 0.0, 1.0, 2.0],
             [0.0, 0.0, 0.0, 1.0],
@@ -215,13 +215,13 @@ mod tests {
         ] {
             assert_eq!(told(sides), Ok(()), "{sides:?}");
         }
-        // Half of it is in the frame, whether it is corners or not.
+        // Half of the box is in the frame, so it is not refused, even where its numbers may be corners.
         assert_eq!(told([320.0, 0.0, 640.0, 480.0]), Ok(()));
         assert_eq!(
             box_warnings(&[rect([-20.0, 100.0, 40.0, 60.0])], SIZE),
             None
         );
-        // Corners are four pixels apart.
+        // Corners must be four pixels apart along x and along y.
         let corners = told([600.0, 460.0, 604.0, 464.0]).unwrap_err();
         assert!(corners.contains("box=600,460,4,4"), "{corners}");
         for sides in [[600.0, 460.0, 603.9, 464.0], [600.0, 460.0, 604.0, 463.9]] {
@@ -252,7 +252,7 @@ mod tests {
         ] {
             assert_eq!(guess(sides), None, "{sides:?}");
         }
-        // Less than half a percent is told as one.
+        // The share is rounded to whole percents, here from 2.1 %.
         let warned = box_warnings(&[rect([100.0, 100.0, 546.0, 384.0])], SIZE).unwrap();
         assert!(warned[0].starts_with("2 %"), "{warned:?}");
     }

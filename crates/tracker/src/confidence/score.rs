@@ -6,11 +6,11 @@
 //! the first box the answer is (does the box still fit). It estimates the chance that the box overlaps the target by
 //! half or more.
 //!
-//! Without one, as in the preset `paper`, the score is **not calibrated**: it orders frames, but is no probability.
-//! The distance of the chosen candidate to the nearest entry of the bag is small while the target looks as it did,
-//! but what is small differs from video to video. So it is divided by its running mean over the frames of this
-//! session that were tracked. The score is 1 / (1 + (r / 3)²) of this ratio r: 0.9 at the mean, 0.5 at three times
-//! the mean.
+//! Without a discriminant, as in the preset `paper`, the score is **not calibrated**: it orders frames, but is no
+//! probability. The distance of the chosen candidate to the nearest entry of the bag is small while the target looks as
+//! it did, but what is small differs from video to video. So it is divided by its running mean over the frames of this
+//! session that were tracked. The score is 1 / (1 + (r / 3)²) of this ratio r: 0.9 at the mean, 0.5 at three times the
+//! mean.
 
 use serde::{Deserialize, Serialize};
 

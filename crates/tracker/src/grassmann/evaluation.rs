@@ -188,7 +188,7 @@ fn compare_as<const M: usize, const N: usize>(
     let products = DMatrixView::from_slice(&evaluation.products, rows, columns);
     let patches = evaluation.patches.chunks_exact(len).enumerate();
     for (i, v) in patches.skip(previous) {
-        // The products of V = [v, H] with vector `x` of the bag; zero beyond the columns of V.
+        // The products of V = [v, H] with vector `x` of `bag`; zero beyond the columns of V.
         let with = |x: usize| {
             let mut column = SVector::<f64, M>::zeros();
             column[0] = products[(x, i)];

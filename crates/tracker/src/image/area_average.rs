@@ -231,7 +231,7 @@ impl Divisor {
 mod tests {
     use super::*;
 
-    /// The same by the definition: overlaps of intervals, in floating point.
+    /// The averages by their definition: overlaps of intervals, in floating point.
     fn by_definition(luma: &[u8], source: (u32, u32), target: (u32, u32)) -> Vec<f64> {
         let overlap = |o: u32, s: u32, source: u32, target: u32| {
             let ratio = f64::from(source) / f64::from(target);

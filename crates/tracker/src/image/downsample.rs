@@ -14,8 +14,8 @@ use crate::image::plane::Plane;
 /// The shorter side of a cell in larger pixels is at least this long. At 4 the scale is measured too coarsely, and the
 /// box does not follow a target that grows.
 const MIN_CELL_SIDE: f64 = 6.0;
-/// The same for a target that has become smaller. What is remembered of it was seen at the first factor, so the factor
-/// changes late.
+/// The least such side for a target that has become smaller. What the models know of it was seen at the first factor,
+/// so the factor changes late.
 const MIN_SHRUNK_CELL_SIDE: f64 = 4.0;
 /// The largest factor.
 const MAX_FACTOR: usize = 4;

@@ -100,7 +100,7 @@ fn interpolated(plane: &Plane, x: i32, y: i32) -> u8 {
     let (width, height) = (plane.width as usize, plane.height as usize);
     let inside = |at: i32, count: usize| at.clamp(0, (count as i32 - 1) << COORDINATE_BITS);
     let whole = |at: i32| (at >> COORDINATE_BITS) as usize;
-    // A negative coordinate is larger than any other here.
+    // As an unsigned number a negative coordinate is larger than any other.
     let (column, row) = (whole(x), whole(y));
     let (x, y, square) = if column < width - 1 && row < height - 1 {
         let pixels = &plane.pixels[row * width + column..][..width + 2];
@@ -157,7 +157,7 @@ mod tests {
         assert_eq!(rotated(&original, 0.0), original);
         let turned = rotated(&original, std::f64::consts::FRAC_PI_2);
         for (x, y) in [(40, 30), (20, 10), (59, 49), (39, 29)] {
-            // About the point between the pixels 39 and 40 and the rows 29 and 30.
+            // The turn is about the point between the columns 39 and 40 and the rows 29 and 30.
             let (from_x, from_y) = (69 - y, x - 10);
             let expected = original.pixels()[from_y * 80 + from_x];
             assert_eq!(turned.pixels()[y * 80 + x], expected, "{x} {y}");
@@ -209,7 +209,7 @@ mod tests {
         Rotation::about(CENTER, 0.5).apply(&original, &beyond, Frame::default());
     }
 
-    /// Chroma has pixels twice as large, about the same point.
+    /// Chroma has pixels twice as large, and is rotated about the same point.
     #[test]
     fn chroma_is_rotated_as_luma_is() {
         let rgb = |i: usize| {

@@ -87,8 +87,8 @@ impl FixedPoint {
         set(self, vectors, len);
     }
 
-    /// The inner products of each vector with each of `others`, all of length `len`: those of the `i`-th from `out[i *
-    /// stride]` on. What is between the rows of products is 0. `sums` is scratch.
+    /// The inner products of each vector with each of `others`, all of length `len`: those of vector `i` begin at
+    /// `out[i * stride]`. Between the rows of products there are zeros. `sums` is scratch.
     #[inline(always)]
     pub fn inner_products<S: Simd>(
         &self,

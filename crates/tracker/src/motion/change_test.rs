@@ -106,8 +106,8 @@ impl ChangeTest {
         }
     }
 
-    /// The share of `area` that lies beside the last box, times the likeness of the two small images there: in \[0,
-    /// 1\]; 0 where too few pixels are compared.
+    /// A number in \[0, 1\]: the share of `area` that lies beside the last box, times the likeness of the two small
+    /// images there. 0 where too few pixels are compared.
     fn unchanged(&self, area: &Rect, last_box: &Rect) -> f64 {
         let (pixels, sums) = self.integral.over(area);
         let (covered, covered_sums) = self.integral.over(&area.intersection(last_box));
@@ -145,7 +145,7 @@ mod tests {
         Particle { x, y, scale: 1.0 }
     }
 
-    /// A scene, moved right by `shift`, on which something striped covers the box of `target`.
+    /// A scene, moved right by `shift`, in which stripes cover the box of `target`.
     fn frame(shift: usize, target: &Particle) -> Frame {
         let area = BOUNDS.area(target);
         let gray = |x: usize, y: usize| {
@@ -164,7 +164,8 @@ mod tests {
         Frame::from_luma(160, 120, pixels).expect("a frame of this size")
     }
 
-    /// The test of a frame after one that had the target at `from`, when the image moved by `shift`.
+    /// The test of a frame with the target at `to`, after a frame with the target at `from`; the image moved by `shift`
+    /// pixels.
     fn compared(from: Particle, to: Particle, shift: usize) -> ChangeTest {
         let (mut test, mut last) = (ChangeTest::default(), LastSeen::default());
         test.load(&frame(0, &from), &from, &BOUNDS);
@@ -203,7 +204,8 @@ mod tests {
         }
     }
 
-    /// The same by its definition, pixel by pixel: `last` is the small image of then, three pixels further left.
+    /// The unchanged share by its definition, pixel by pixel; `last` is the earlier small image, three pixels further
+    /// left.
     fn plain(test: &ChangeTest, last: &[u8], at: &Particle) -> f64 {
         let edges = |area: Rect| [area.x, area.y, area.x + area.width, area.y + area.height];
         let (now, was) = (
@@ -215,7 +217,8 @@ mod tests {
             (left..right).contains(&(x as f64)) && (top..bottom).contains(&(y as f64))
         };
         let (mut sums, mut beside) = ([0.0; 5], 0.0);
-        // Compared is what is within 60 pixels of a box 30 wide around 52: up to pixel 32.
+        // The pixels within 60 working pixels of a box 30 wide around 52 are compared: up to pixel 32 of the small
+        // image.
         for (index, &pixel) in test.image.pixels.iter().enumerate() {
             let (x, y) = (index % test.image.width(), index / test.image.width());
             if (3..32).contains(&x) && within(now, x, y) && !within(was, x, y) {

@@ -92,7 +92,7 @@ fn sum_up_simd<S: Simd>(_: S, frame: &Frame, columns: &mut Vec<f32>, rows: &mut 
 #[pulp::with_simd(best_displacement = Arch::new())]
 #[inline(always)]
 fn best_displacement_simd<S: Simd>(_: S, before: &[f32], after: &[f32]) -> f64 {
-    // So that two thirds of the profiles always overlap.
+    // Bounded so that two thirds of the profiles always overlap.
     let radius = RADIUS.min(before.len() / 3);
     let mut best = (0, f32::INFINITY);
     let mut still = 0.0;

@@ -178,7 +178,8 @@ mod tests {
             background_samples,
             ..robust.clone()
         };
-        // Limited by their number, by their values, and by their products with the background; at the limit already.
+        // The count is limited by the number of particles, by their values, by their products with the background; the
+        // last parameters are at the limit already.
         for (params, expected) in [
             (large(600, 8, 64), 1000),
             (large(200, 20, 32), 229),

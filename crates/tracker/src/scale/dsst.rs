@@ -188,7 +188,7 @@ mod tests {
         let filter = learned();
         let mut seen = pyramid(1.0);
         let found = respond(&filter, &mut seen);
-        // The same by the definition, with complex sums over the frequencies and their negatives.
+        // The response by its definition, with complex sums over the frequencies and their negatives.
         let mut learned = pyramid(0.0);
         learned.transform(pulp::Scalar);
         seen = pyramid(1.0);
