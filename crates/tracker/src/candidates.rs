@@ -63,7 +63,7 @@ pub(crate) struct Candidates {
     pub particles: Vec<Particle>,
     /// The feature vectors, with the mean of the appearance model subtracted.
     vectors: AlignedBuffer<f32>,
-    /// D.
+    /// D, the length of a vector.
     len: usize,
     /// The squared lengths of the vectors.
     squares: Vec<f32>,

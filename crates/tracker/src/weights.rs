@@ -61,7 +61,7 @@ impl Likelihoods {
         &self.values
     }
 
-    /// Equations 11 and 10.
+    /// Computes the normalised likelihoods of the distances (equations 11 and 10).
     #[inline(always)]
     fn normalize(&mut self, distances: &[f64], entries: usize, sigma: f64) {
         let Self {
@@ -96,7 +96,7 @@ impl Likelihoods {
         }
     }
 
-    /// Equation 9, times what `weights` hold.
+    /// Multiplies what `weights` hold by the sum of the likelihoods (equation 9), and scales the products to the sum 1.
     #[inline(always)]
     fn sum_rule(&self, entries: usize, (pinned, pinned_weight): (usize, f64), weights: &mut [f64]) {
         // Entries that all weigh nothing would be no likelihood at all.

@@ -34,7 +34,7 @@ const REFRESHED: f64 = 0.2;
 /// Vectors of areas beside the target, and what follows from them.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Background {
-    /// Oldest first.
+    /// The samples, oldest first.
     samples: VecDeque<QuantizedVector>,
     /// The mean of the samples; empty without samples.
     #[serde(skip)]

@@ -9,7 +9,7 @@ use crate::params::table::Params;
 /// Up to K affine subspaces, each in the form of an `E`, oldest first.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Bag<E> {
-    /// At least one once a session has begun.
+    /// The entries: at least one once a session has begun.
     pub entries: VecDeque<E>,
 }
 
@@ -50,7 +50,7 @@ impl<E: Default> Bag<E> {
 /// The feature vectors of the last tracked frames, each in the form of a `V`, newest first.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct History<V> {
-    /// 1 to P of them once a session has begun.
+    /// The vectors: 1 to P once a session has begun.
     pub vectors: VecDeque<V>,
 }
 

@@ -155,7 +155,7 @@ impl TrainingSamples {
 /// The coefficients c of a sum over samples.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Coefficients<'a> {
-    /// One for each sample.
+    /// A coefficient for each sample.
     Given(&'a [f32]),
     /// uᵢ · d.
     ProductsWith(&'a [f32]),

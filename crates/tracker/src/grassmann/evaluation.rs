@@ -57,7 +57,7 @@ struct Candidate<const M: usize, const N: usize> {
 }
 
 impl<const M: usize, const N: usize> Candidate<M, N> {
-    /// From VᵀV.
+    /// The candidate's subspace, from VᵀV.
     #[inline(always)]
     fn of(gram: SMatrix<f64, M, M>, columns: usize, basis_dim: usize) -> Self {
         // μ = V 1 / (P + 1).

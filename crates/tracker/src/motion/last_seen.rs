@@ -24,7 +24,7 @@ const KEPT_BITS: u8 = !3;
 /// The part of a working image around the last box, in pixels that are [`CELL`] times as large.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct SmallImage {
-    /// Row by row.
+    /// The gray values, row by row.
     #[serde(serialize_with = "as_bytes")]
     pub pixels: Vec<u8>,
     width: u32,
@@ -89,7 +89,7 @@ pub(crate) fn small_box(particle: &Particle, bounds: &StateBounds) -> Rect {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct LastSeen {
     pub image: SmallImage,
-    /// None before the first frame.
+    /// The target in that frame; none before the first frame.
     pub target: Option<Particle>,
 }
 

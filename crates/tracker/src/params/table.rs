@@ -188,7 +188,7 @@ parameters! {
         chroma_weight: f64 [0 to 10];
         /// Weight of the colour histogram (of luma, without colour): the likelihood is multiplied by exp(weight · m),
         /// where m is the mean over the box of the probability that a pixel's colour is the target's, minus a half.
-        /// Searching from the answer. Off: 0.
+        /// Off: 0.
         histogram_weight: f64 [0 to 100];
         /// The sides of the area that is described, as a multiple of the box's. What surrounds a target tells where it
         /// ends. Off: 1.
