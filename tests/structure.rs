@@ -1,5 +1,5 @@
-//! The rules for the sources that the compiler does not keep: no circles between folders, and each folder says what it
-//! is.
+//! The rules for the sources that the compiler does not keep: no circles between folders, each folder says what it is,
+//! and each file is compiled.
 //!
 //! A crate is a wall, so what a crate may use stands in its manifest. Inside a crate a folder is a room: two rooms, of
 //! which none is in the other, do not use each other, directly or through others. Files of one room may.
@@ -193,6 +193,30 @@ fn without_header(src: &Path) -> Vec<String> {
     bare.map(|path| path.display().to_string()).collect()
 }
 
+/// The files that their parent does not declare: the compiler never reads them.
+fn undeclared(src: &Path) -> Vec<String> {
+    let text = |path: &str| fs::read_to_string(src.join(path)).unwrap_or_default();
+    let files = WalkDir::new(src)
+        .into_iter()
+        .map(|entry| entry.expect("a readable folder").into_path());
+    let sources = files.filter(|path| path.extension().is_some_and(|extension| extension == "rs"));
+    let lost = sources.filter(|path| {
+        let file = module(src, path);
+        let Some((name, parent)) = file.split_last() else {
+            return false;
+        };
+        let parents = match parent.join("/") {
+            root if root.is_empty() => ["lib.rs".to_owned(), "main.rs".to_owned()],
+            parent => [format!("{parent}.rs"), format!("{parent}/mod.rs")],
+        };
+        let declares = format!("mod {name};");
+        !parents
+            .iter()
+            .any(|parent| text(parent).contains(&declares))
+    });
+    lost.map(|path| path.display().to_string()).collect()
+}
+
 fn assert_none(faults: &[String], what: &str) {
     assert!(faults.is_empty(), "{what}:\n{}", faults.join("\n"));
 }
@@ -210,6 +234,12 @@ fn every_room_says_what_it_is() {
         .flat_map(|src| without_header(src))
         .collect();
     assert_none(&found, "rooms without a header");
+}
+
+#[test]
+fn every_file_is_compiled() {
+    let found: Vec<String> = crates().iter().flat_map(|src| undeclared(src)).collect();
+    assert_none(&found, "files that no module declares");
 }
 
 /// The circles among these files.

@@ -148,7 +148,7 @@ fn shown(x: f64, y: f64, width: f64, height: f64) -> String {
 }
 
 fn percent(share: f64) -> f64 {
-    (100.0 * share).round().max(1.0)
+    (100.0 * share).round()
 }
 
 #[cfg(test)]

@@ -88,13 +88,13 @@ fn resample(plane: &[u8], size: (u32, u32), square: &Square, beyond: f32, channe
     let columns = Between::along(square.center.0, square.side, pixels, size.0);
     let rows = Between::along(square.center.1, square.side, pixels, size.1);
     let width = size.0 as usize;
-    // A row interpolated between two rows of the plane, as far as the square reaches. Its last values stay `beyond`,
+    // A row interpolated between two rows of the plane, as far as the square reaches. Its last value stays `beyond`,
     // for pixels beyond the plane.
     let inside = columns.iter().flat_map(|column| column.places).flatten();
     let (first, last) = inside.fold((usize::MAX, 0), |(first, last), place| {
         (first.min(place), last.max(place))
     });
-    let mut line = vec![beyond; 2 + (last + 1).saturating_sub(first)];
+    let mut line = vec![beyond; 1 + (last + 1).saturating_sub(first)];
     let outside = line.len() - 1;
     let index = |place: Option<usize>| place.map_or(outside, |place| place - first);
     let taps: Vec<_> = columns
@@ -107,7 +107,7 @@ fn resample(plane: &[u8], size: (u32, u32), square: &Square, beyond: f32, channe
         let pair = row
             .places
             .map(|place| if reaches { of(place) } else { None });
-        blend(pair, row.share, beyond, &mut line[..outside - 1]);
+        blend(pair, row.share, beyond, &mut line[..outside]);
         for ((value, tap), column) in channel.iter_mut().zip(&taps).zip(&columns) {
             let [left, right] = tap.map(|tap| line[tap]);
             *value = left + (right - left) * column.share;
