@@ -50,8 +50,7 @@ pub use bagtrack_config::{
 pub use bagtrack_net::CertificateError;
 pub use bagtrack_quotas::Client;
 pub use resources::routes::document as openapi_document;
-pub use server::application::{Application, Shutdown};
-pub use server::bind_error::BindError;
-pub use server::connection_service::ConnectionService;
+pub use server::application::{Application, BindError, Shutdown};
+pub use server::connections::ConnectionService;
 pub use server::service::Service;
 pub use state::Parts;

@@ -1,15 +1,11 @@
-//! Accepting connections, and ending.
+//! Listening, and ending.
 //!
-//! `axum::serve` has no time limit for request heads: a client that sends half a line holds its connection for ever.
-//! hyper's connection builder has one. Connections are [counted](Connections), too. On shutdown, busy ones get a
-//! bounded time to end.
+//! On shutdown, busy connections get a bounded time to end. Each reason why the service cannot start names the setting
+//! to change.
 
-use super::bind_error::BindError;
-use super::connection_service::ConnectionService;
-use super::refusal;
+use super::connections::{ConnectionService, accept};
 use super::service::Service;
-use crate::http::problems::problem::Problem;
-use crate::http::state::{AppState, Parts};
+use crate::http::state::Parts;
 use axum::Router;
 #[cfg(feature = "jwt")]
 use bagtrack_access::JwtError;
@@ -17,29 +13,23 @@ use bagtrack_access::{Access, AccessError, ApiKeys};
 use bagtrack_cli::ModelFiles;
 #[cfg(feature = "tls")]
 use bagtrack_config::TlsConfig;
-use bagtrack_config::{Config, PROBE_CONNECTIONS};
+use bagtrack_config::{Config, ConfigError};
+use bagtrack_net::Security;
 #[cfg(feature = "tls")]
 use bagtrack_net::{Certificate, CertificateError};
-use bagtrack_net::{ConnectionHold, Connections, NoRoom, Security, is_trusted};
-use bagtrack_sessions::clock::{sleep, timeout};
-use bagtrack_sessions::{Clock, Executor};
-use std::io::{self, Write};
+use bagtrack_sessions::clock::timeout;
+use bagtrack_sessions::{Clock, Executor, FileStoreError};
+use std::io;
 use std::net::SocketAddr;
 use std::pin::pin;
-use std::sync::Arc;
-use std::time::Duration;
 use std::time::SystemTime;
-use tokio::net::{TcpListener, TcpStream};
+use tokio::net::TcpListener;
 use tokio::sync::watch;
 
 /// Bytes of an answer that the system takes while it waits to send them. With more, a client that reads slowly but
 /// steadily would for a long time seem to take nothing.
 #[cfg(target_os = "linux")]
 const MAX_UNSENT: u32 = 64 << 10;
-/// How long to wait before looking for room again.
-const RETRY: Duration = Duration::from_millis(100);
-/// Most connections for probes alone of one address.
-const PROBE_CONNECTIONS_OF_ADDRESS: usize = 8;
 
 /// How a service ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,6 +44,38 @@ impl From<()> for Shutdown {
     fn from((): ()) -> Self {
         Self::Gradual
     }
+}
+
+/// Why the service could not start.
+#[derive(Debug, thiserror::Error)]
+pub enum BindError {
+    /// A setting is out of its range.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The keys cannot be used, or the service would be open to a network.
+    #[error(transparent)]
+    Access(#[from] AccessError),
+    /// There is no certificate to show, where the settings name one.
+    #[cfg(feature = "tls")]
+    #[error(transparent)]
+    Certificate(#[from] CertificateError),
+    /// The address cannot be listened on.
+    #[error("cannot listen on {address} (--listen, BAGTRACK_LISTEN): {source}")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The folder of the store cannot be used.
+    #[error("{0} (--store, BAGTRACK_STORE)")]
+    Store(#[from] FileStoreError),
+    /// The network of the second opinion cannot be used.
+    #[error("{0} (--model, BAGTRACK_MODEL)")]
+    Model(String),
+    /// The system gives no threads.
+    #[error("cannot start the workers (--workers, BAGTRACK_WORKERS): {0}")]
+    Workers(io::Error),
 }
 
 /// The service, bound to its address.
@@ -229,67 +251,4 @@ async fn load_access(config: &Config, now: SystemTime) -> Result<Access, AccessE
 fn security(tls: &TlsConfig, now: SystemTime) -> Result<Security, CertificateError> {
     let certificate = Certificate::load(tls.tls_cert.as_deref(), tls.tls_key.as_deref(), now)?;
     Ok(certificate.map_or(Security::Plain, Security::Tls))
-}
-
-/// Accepts connections for ever. The first service has them, and the second one those over the share of their address.
-/// They end when `cut_off` loses its sender.
-async fn accept(
-    listener: &TcpListener,
-    state: &AppState,
-    services: [ConnectionService; 2],
-    ending: &watch::Sender<bool>,
-    cut_off: watch::Receiver<()>,
-) {
-    let (config, limits) = (&state.config, &state.config.limits);
-    let of_address = limits.client_connections;
-    let of_address = of_address.unwrap_or(config.max_connections.div_ceil(4));
-    let shed = state.metrics.shed_connections.clone();
-    let connections = Connections::new(config.max_connections, of_address, shed.clone());
-    let probes = Connections::new(PROBE_CONNECTIONS, PROBE_CONNECTIONS_OF_ADDRESS, shed);
-    let [service, probe_service] = services.map(Arc::new);
-    loop {
-        let (stream, peer) = match listener.accept().await {
-            Ok(accepted) => accepted,
-            Err(error) => {
-                // Mostly too many open files: wait for connections to end.
-                tracing::warn!(%error, "cannot accept");
-                sleep(RETRY).await;
-                continue;
-            }
-        };
-        let is_proxy = is_trusted(peer.ip().to_canonical(), &limits.trusted_proxies);
-        let permit = loop {
-            match connections.enter(peer.ip(), is_proxy) {
-                Err(NoRoom::All) => {
-                    connections.freed.notified().await;
-                }
-                other => break other,
-            }
-        };
-        let (permit, service) = match permit {
-            Ok(permit) => (permit, service.clone()),
-            Err(_) => match probes.enter(peer.ip(), false) {
-                Ok(permit) => (permit, probe_service.clone()),
-                Err(_) => {
-                    refuse(stream, peer, state, service.has_tls());
-                    continue;
-                }
-            },
-        };
-        let hold = ConnectionHold::new(permit, ending.subscribe(), cut_off.clone());
-        tokio::spawn(async move { service.serve(stream, peer, hold).await });
-    }
-}
-
-/// Tells a client that it has too many connections, as far as its system takes that at once. With TLS the connection is
-/// closed without a word: what is said before the handshake looks like a fault of the service.
-fn refuse(stream: TcpStream, peer: SocketAddr, state: &AppState, has_tls: bool) {
-    let problem = Problem::too_many_connections();
-    let answer = refusal::answer_of(&problem, peer.ip(), &state.metrics);
-    if let Ok(mut stream) = stream.into_std()
-        && !has_tls
-    {
-        // It does not wait: the stream is not in blocking mode.
-        let _ = stream.write(&answer);
-    }
 }

@@ -2,12 +2,10 @@
 //!
 //! In: the settings. Out: an [`Application`](application::Application). [`router`] has all routes.
 //!
-//! What can go wrong: there is no room for a connection, and its client is [told so](refusal); a client does not end
-//! its connection when the service ends, and is cut off.
+//! What can go wrong: there is no room for a connection, and its client is [told so](connections); a client does not
+//! end its connection when the service ends, and is cut off.
 
 pub mod application;
-pub mod bind_error;
-pub mod connection_service;
-mod refusal;
+pub mod connections;
 pub mod router;
 pub mod service;

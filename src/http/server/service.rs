@@ -1,7 +1,7 @@
 //! The service without a network: its routes, and what goes on beside requests.
 
-use super::bind_error::BindError;
-use crate::http::server::connection_service::ConnectionService;
+use super::application::BindError;
+use super::connections::ConnectionService;
 use crate::http::server::router::router;
 use crate::http::state::{AppState, Parts};
 use axum::{Extension, Router};

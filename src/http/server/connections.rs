@@ -1,27 +1,137 @@
-//! What a connection goes through from when it is accepted to its end.
+//! Connections: accepted or refused, and what each goes through to its end.
+//!
+//! `axum::serve` has no time limit for request heads: a client that sends half a line holds its connection for ever.
+//! hyper's connection builder has one. Connections are [counted](Connections), too.
 
+use crate::http::metrics::registry::Metrics;
+use crate::http::middleware::security_headers::{HEADERS, STRICT};
+use crate::http::problems::problem::Problem;
+use crate::http::respond::json;
 #[cfg(feature = "tls")]
 use crate::http::server::router::https_only;
 use crate::http::server::router::probes_only;
 use crate::http::state::AppState;
 use axum::Router;
 use axum::body::Body;
-use bagtrack_config::MAX_BUFFER_BYTES;
+use axum::http::header::CONTENT_SECURITY_POLICY;
+use bagtrack_api::media_types::PROBLEM;
+use bagtrack_config::{MAX_BUFFER_BYTES, PROBE_CONNECTIONS};
 use bagtrack_net::{
-    Begun, ClientLimits, ConnectionHold, ConnectionIo, Peer, Security, Transport, is_trusted,
+    Begun, ClientLimits, ConnectionHold, ConnectionIo, Connections, NoRoom, Peer, Security,
+    Transport, is_trusted,
 };
 use bagtrack_quotas::Client;
-use bagtrack_sessions::clock::timeout;
+use bagtrack_sessions::clock::{sleep, timeout};
+use bagtrack_sessions::random::new_id;
 use hyper::Request;
 use hyper::body::Incoming;
 use hyper::server::conn::http1;
 use hyper::service::{Service, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
-use std::net::SocketAddr;
+use std::io::Write;
+use std::net::{IpAddr, SocketAddr};
+use std::sync::Arc;
 use std::time::Duration;
-use tokio::net::TcpStream;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::watch;
 use tokio::task::yield_now;
+
+/// How long to wait before looking for room again.
+const RETRY: Duration = Duration::from_millis(100);
+/// Most connections for probes alone of one address.
+const PROBE_CONNECTIONS_OF_ADDRESS: usize = 8;
+
+/// Accepts connections for ever. The first service has them, and the second one those over the share of their address.
+/// They end when `cut_off` loses its sender.
+pub(super) async fn accept(
+    listener: &TcpListener,
+    state: &AppState,
+    services: [ConnectionService; 2],
+    ending: &watch::Sender<bool>,
+    cut_off: watch::Receiver<()>,
+) {
+    let (config, limits) = (&state.config, &state.config.limits);
+    let of_address = limits.client_connections;
+    let of_address = of_address.unwrap_or(config.max_connections.div_ceil(4));
+    let shed = state.metrics.shed_connections.clone();
+    let connections = Connections::new(config.max_connections, of_address, shed.clone());
+    let probes = Connections::new(PROBE_CONNECTIONS, PROBE_CONNECTIONS_OF_ADDRESS, shed);
+    let [service, probe_service] = services.map(Arc::new);
+    loop {
+        let (stream, peer) = match listener.accept().await {
+            Ok(accepted) => accepted,
+            Err(error) => {
+                // Mostly too many open files: wait for connections to end.
+                tracing::warn!(%error, "cannot accept");
+                sleep(RETRY).await;
+                continue;
+            }
+        };
+        let is_proxy = is_trusted(peer.ip().to_canonical(), &limits.trusted_proxies);
+        let permit = loop {
+            match connections.enter(peer.ip(), is_proxy) {
+                Err(NoRoom::All) => {
+                    connections.freed.notified().await;
+                }
+                other => break other,
+            }
+        };
+        let (permit, service) = match permit {
+            Ok(permit) => (permit, service.clone()),
+            Err(_) => match probes.enter(peer.ip(), false) {
+                Ok(permit) => (permit, probe_service.clone()),
+                Err(_) => {
+                    refuse(stream, peer, state, service.has_tls());
+                    continue;
+                }
+            },
+        };
+        let hold = ConnectionHold::new(permit, ending.subscribe(), cut_off.clone());
+        tokio::spawn(async move { service.serve(stream, peer, hold).await });
+    }
+}
+
+/// Tells a client that it has too many connections, as far as its system takes that at once. With TLS the connection is
+/// closed without a word: what is said before the handshake looks like a fault of the service.
+fn refuse(stream: TcpStream, peer: SocketAddr, state: &AppState, has_tls: bool) {
+    let problem = Problem::too_many_connections();
+    let answer = refusal(&problem, peer.ip(), &state.metrics);
+    if let Ok(mut stream) = stream.into_std()
+        && !has_tls
+    {
+        // It does not wait: the stream is not in blocking mode.
+        let _ = stream.write(&answer);
+    }
+}
+
+/// The answer that ends a connection of this client with a problem, written before any request is read. Counts it, and
+/// writes its line in the log.
+fn refusal(problem: &Problem, client: IpAddr, metrics: &Metrics) -> Vec<u8> {
+    let id = new_id().to_string();
+    metrics.problem(problem.kind());
+    let (kind, status) = (problem.kind().slug(), problem.kind().status());
+    tracing::info!(id, %client, kind, status, "connection refused");
+    let document = problem.document("", "/".to_owned(), id.clone());
+    let body = json::line(&document).unwrap_or_default();
+    let retry = problem.retry_seconds();
+    let retry = retry.map_or(String::new(), |seconds| {
+        format!("retry-after: {seconds}\r\n")
+    });
+    let security = [(CONTENT_SECURITY_POLICY, STRICT)]
+        .into_iter()
+        .chain(HEADERS);
+    let security: String = security
+        .map(|(name, value)| format!("{name}: {value}\r\n"))
+        .collect();
+    let head = format!(
+        "HTTP/1.1 {}\r\ncontent-type: {PROBLEM}\r\ncontent-length: {}\r\n{retry}x-request-id: {id}\r\n\
+         cache-control: no-store\r\n{security}connection: close\r\n\r\n",
+        problem.status(),
+        body.len()
+    );
+    [head.into_bytes(), body].concat()
+}
 
 /// How long a connection that is for probes alone may take to begin: others wait for its place.
 const PROBE_TIMEOUT: Duration = Duration::from_secs(5);
