@@ -14,8 +14,6 @@ pub mod client_identity;
 pub mod cors;
 pub mod count_requests;
 pub mod draining;
-#[cfg(feature = "otel")]
-pub mod exported_span;
 pub mod host_and_origin;
 pub mod lingering_close;
 pub mod request_log;

@@ -8,6 +8,8 @@
 
 use super::client_identity::note_address;
 use super::count_requests::method_label;
+#[cfg(feature = "otel")]
+use super::trace_context::exported;
 use super::trace_context::{TRACEPARENT, TraceContext};
 use crate::http::extract::instance::Instance;
 use crate::http::problems::problem::Problem;
@@ -43,7 +45,7 @@ pub async fn log_request(
         TraceContext::of(request.headers()),
     );
     #[cfg(feature = "otel")]
-    let context = super::exported_span::join(&span, &request, context);
+    let context = exported::join(&span, &request, context);
     span.record("trace", context.trace_id());
     let mut response = next(request).instrument(span.clone()).await;
     response.headers_mut().insert(TRACEPARENT, context.header());
@@ -52,7 +54,7 @@ pub async fn log_request(
         (started.elapsed().as_secs_f64() * 1e6).round() / 1e3,
     );
     #[cfg(feature = "otel")]
-    super::exported_span::answered(&span, status);
+    exported::answered(&span, status);
     let problem = response.extensions_mut().remove::<Problem>();
     let kind = problem.as_ref().map(Problem::kind);
     let cause = problem.as_ref().and_then(Problem::cause);
