@@ -84,7 +84,7 @@ impl Caller {
     }
 }
 
-/// The client of a request that has passed [the middleware that notes it](crate::http::middleware::client_identity).
+/// The client of a request that has passed [the middleware that notes it](crate::http::middleware::client_quotas).
 pub fn client_of(parts: &Parts) -> Client {
     let client = parts.extensions.get::<Client>().cloned();
     client.unwrap_or_else(|| Client::at(Ipv4Addr::UNSPECIFIED.into()))

@@ -1,12 +1,12 @@
 //! Which pages of other origins may call.
 
+use super::client_quotas::{RATE_LIMIT, RATE_LIMIT_POLICY};
 use super::draining::DRAINING;
 use super::trace_context::TRACEPARENT;
 use crate::http::extract::idempotency_key::IDEMPOTENCY_KEY;
 use crate::http::extract::instance::REQUEST_ID;
 use crate::http::respond::annotated_image::ANSWER;
 use crate::http::respond::answer::{CHECKPOINT, REPLAYED};
-use crate::http::respond::rate_limit::{RATE_LIMIT, RATE_LIMIT_POLICY};
 use axum::http::header::{AUTHORIZATION, CONTENT_TYPE, LOCATION, RETRY_AFTER};
 use axum::http::{HeaderName, HeaderValue, Method};
 use std::time::Duration;

@@ -6,7 +6,7 @@
 //! of a session's id only its beginning. Probes come every few seconds: without `debug` only a refused one has a line,
 //! which names it, and none has a span.
 
-use super::client_identity::note_address;
+use super::client_quotas::note_address;
 use super::count_requests::method_label;
 #[cfg(feature = "otel")]
 use super::trace_context::exported;

@@ -9,5 +9,4 @@ pub mod charged_body;
 pub mod created_session;
 pub mod json;
 pub mod ndjson;
-pub mod rate_limit;
 pub mod video_answer;
