@@ -23,7 +23,7 @@ pub(super) const MAX_HEAD_BYTES: usize = 16 << 10;
 #[error("the head of a part has more than {MAX_HEAD_BYTES} bytes")]
 pub(super) struct HeadTooLong;
 
-/// The body came more slowly than [it may](crate::http::middleware::body_pace).
+/// The body came more slowly than [it may](crate::http::middleware::request_body).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the body is too slow")]
 pub struct TooSlow;

@@ -5,12 +5,11 @@
 
 use super::answer_problems::answer_problems;
 use super::authenticate::{authenticate, authenticate_metrics};
-use super::body_pace::pace_body;
 use super::client_quotas::{bound_rate, identify};
 use super::count_requests::count_request;
 use super::draining::mark_draining;
 use super::host_and_origin::{check_origin, one_host};
-use super::lingering_close::drain_refused;
+use super::request_body::{drain_refused, pace_body};
 use super::request_log::log_request;
 use super::security_headers::secure;
 use crate::http::extract::instance::{REQUEST_ID, set_request_id};

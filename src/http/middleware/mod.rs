@@ -3,19 +3,18 @@
 //! In: a request. Out: the request, with what was found in its extensions, or a response in its place.
 //!
 //! What can go wrong: a client says that it is another (`X-Forwarded-For` counts only from a trusted proxy), or reads
-//! no answer because it is still sending its body ([`lingering_close`]).
+//! no answer because it is still sending its body ([`request_body`]).
 
 pub mod answer_problems;
 pub mod authenticate;
 pub mod base_path;
-pub mod body_pace;
 pub mod chain;
 pub mod client_quotas;
 pub mod cors;
 pub mod count_requests;
 pub mod draining;
 pub mod host_and_origin;
-pub mod lingering_close;
+pub mod request_body;
 pub mod request_log;
 pub mod security_headers;
 pub mod trace_context;
