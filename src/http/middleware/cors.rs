@@ -1,7 +1,7 @@
 //! Which pages of other origins may call.
 
 use super::client_quotas::{RATE_LIMIT, RATE_LIMIT_POLICY};
-use super::draining::DRAINING;
+use super::response_headers::DRAINING;
 use super::trace_context::TRACEPARENT;
 use crate::http::extract::idempotency_key::IDEMPOTENCY_KEY;
 use crate::http::extract::instance::REQUEST_ID;

@@ -1,7 +1,7 @@
 //! `/openapi.json`, `/docs/problems`, and `/docs`: Swagger UI from within the program, so that it needs no other host.
 
 use super::static_file::StaticFile;
-use crate::http::middleware::security_headers::{DOCS_POLICY, STRICT};
+use crate::http::middleware::response_headers::{DOCS_POLICY, STRICT};
 use crate::http::problems::page;
 use crate::http::problems::problem::Problem;
 use axum::body::Bytes;

@@ -4,7 +4,7 @@
 
 use super::static_file::StaticFile;
 use crate::http::extract::instance::Instance;
-use crate::http::middleware::security_headers::PAGE_POLICY;
+use crate::http::middleware::response_headers::PAGE_POLICY;
 use crate::http::page::sample_clips;
 use crate::http::problems::problem::Problem;
 use axum::body::Bytes;

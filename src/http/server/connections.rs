@@ -4,7 +4,7 @@
 //! hyper's connection builder has one. Connections are [counted](Connections), too.
 
 use crate::http::metrics::registry::Metrics;
-use crate::http::middleware::security_headers::{HEADERS, STRICT};
+use crate::http::middleware::response_headers::{HEADERS, STRICT};
 use crate::http::problems::problem::Problem;
 use crate::http::respond::json;
 #[cfg(feature = "tls")]

@@ -1,5 +1,6 @@
-//! Headers that tell browsers what the answers may do.
+//! Header fields of every answer: what browsers may do with it, and whether the service is about to end.
 
+use crate::http::state::AppState;
 use axum::http::header::{
     CACHE_CONTROL, CONTENT_SECURITY_POLICY, REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS,
     X_FRAME_OPTIONS,
@@ -22,7 +23,7 @@ pub const DOCS_POLICY: &str = "default-src 'none'; base-uri 'none'; form-action 
     script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self'; \
     connect-src 'self'";
 
-/// What every answer has.
+/// What every answer has against misuse by pages.
 pub const HEADERS: [(HeaderName, &str); 5] = [
     (X_CONTENT_TYPE_OPTIONS, "nosniff"),
     (X_FRAME_OPTIONS, "DENY"),
@@ -47,4 +48,15 @@ pub fn secure(response: &mut Response) {
     headers.entry(CONTENT_SECURITY_POLICY).or_insert(strict);
     let no_store = HeaderValue::from_static("no-store");
     headers.entry(CACHE_CONTROL).or_insert(no_store);
+}
+
+pub const DRAINING: HeaderName = HeaderName::from_static(bagtrack_api::headers::DRAINING);
+
+/// Marks the answers of a service that is about to end with `Draining: true`, so that clients take their sessions
+/// elsewhere in time.
+pub fn mark_draining(state: &AppState, response: &mut Response) {
+    if state.is_draining() {
+        let marked = HeaderValue::from_static("true");
+        response.headers_mut().insert(DRAINING, marked);
+    }
 }
