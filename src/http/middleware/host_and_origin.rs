@@ -1,15 +1,24 @@
-//! Refuses requests that do not name one host, and those that a browser sends for a page of another origin, or under
-//! the name of another host.
+//! Which hosts a request may name, and of which origins a page may be that calls.
 //!
-//! A browser sends "simple" posts of any page without asking first; CORS only hides the answer from the page. So the
-//! origin is checked, too. So is the [host](AllowedHosts).
+//! Requests are refused that do not name one host, and those that a browser sends for a page of another origin, or
+//! under the name of another host. A browser sends "simple" posts of any page without asking first; CORS only hides the
+//! answer from the page. So the origin is checked, too. So is the [host](AllowedHosts).
 
+use super::client_quotas::{RATE_LIMIT, RATE_LIMIT_POLICY};
+use super::response_headers::DRAINING;
+use super::trace_context::TRACEPARENT;
+use crate::http::extract::idempotency_key::IDEMPOTENCY_KEY;
+use crate::http::extract::instance::REQUEST_ID;
 use crate::http::problems::problem::Problem;
+use crate::http::respond::annotated_image::ANSWER;
+use crate::http::respond::answer::{CHECKPOINT, REPLAYED};
 use crate::http::state::AppState;
 use axum::extract::Request;
-use axum::http::header::{HOST, ORIGIN};
-use axum::http::{HeaderMap, Version};
+use axum::http::header::{AUTHORIZATION, CONTENT_TYPE, HOST, LOCATION, ORIGIN, RETRY_AFTER};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, Version};
 use bagtrack_access::AllowedHosts;
+use std::time::Duration;
+use tower_http::cors::{AllowOrigin, CorsLayer};
 
 /// Refuses requests that do not name one host (RFC 9112, section 3.2): caches and proxies before the service might take
 /// another one of several.
@@ -60,4 +69,42 @@ fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
 fn is_same_origin(origin: &str, host: &str) -> bool {
     let authority = origin.split_once("://").map(|(_, authority)| authority);
     authority.is_some_and(|authority| !host.is_empty() && authority.eq_ignore_ascii_case(host))
+}
+
+/// How long a browser need not ask again. The largest that all of them keep to.
+const MAX_AGE: Duration = Duration::from_secs(7200);
+
+/// Tells browsers that pages of the allowed origins may make every call, and pages of other origins none.
+pub fn cors(origins: &[String]) -> CorsLayer {
+    let allowed = if origins.iter().any(|origin| origin == "*") {
+        AllowOrigin::any()
+    } else {
+        let values = origins.iter().map(|origin| HeaderValue::from_str(origin));
+        AllowOrigin::list(values.filter_map(Result::ok))
+    };
+    let name = HeaderName::from_static;
+    CorsLayer::new()
+        .allow_origin(allowed)
+        .allow_methods([Method::GET, Method::POST, Method::PUT, Method::DELETE])
+        .allow_headers([
+            AUTHORIZATION,
+            CONTENT_TYPE,
+            REQUEST_ID,
+            TRACEPARENT,
+            name("tracestate"),
+            name(IDEMPOTENCY_KEY),
+        ])
+        .expose_headers([
+            LOCATION,
+            RETRY_AFTER,
+            REQUEST_ID,
+            TRACEPARENT,
+            DRAINING,
+            RATE_LIMIT,
+            RATE_LIMIT_POLICY,
+            REPLAYED,
+            CHECKPOINT,
+            ANSWER,
+        ])
+        .max_age(MAX_AGE)
 }

@@ -10,7 +10,6 @@ pub mod authenticate;
 pub mod base_path;
 pub mod chain;
 pub mod client_quotas;
-pub mod cors;
 pub mod count_requests;
 pub mod host_and_origin;
 pub mod request_body;

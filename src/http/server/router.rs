@@ -6,7 +6,7 @@ use crate::http::middleware::base_path::mount;
 use crate::http::middleware::chain::{
     every_request, metrics_request, page_request, session_request,
 };
-use crate::http::middleware::cors::cors;
+use crate::http::middleware::host_and_origin::cors;
 use crate::http::page::docs;
 use crate::http::page::sample_clips;
 use crate::http::page::static_files;
