@@ -6,11 +6,10 @@
 use super::answer_problems::answer_problems;
 use super::authenticate::{authenticate, authenticate_metrics};
 use super::client_quotas::{bound_rate, identify};
-use super::count_requests::count_request;
 use super::host_and_origin::{check_origin, one_host};
 use super::request_body::{drain_refused, pace_body};
-use super::request_log::log_request;
 use super::response_headers::{mark_draining, secure};
+use super::telemetry::{count_request, log_request};
 use crate::http::extract::instance::{REQUEST_ID, set_request_id};
 use crate::http::state::AppState;
 use axum::extract::{Request, State};

@@ -1,5 +1,5 @@
-//! One line in the log for each request, with the problem that it was answered with; a span around what is logged on
-//! its behalf, and the trace that it belongs to.
+//! What is recorded of each request: its metrics, and one line in the log, with the problem that it was answered with;
+//! a span around what is logged on its behalf, and the trace that it belongs to.
 //!
 //! The span has the ids of the request and of its trace, the client's address, the name of its API key (never the key),
 //! the method, where some call has it, and the path: never bytes or boxes, no more of the path than any route has, and
@@ -7,18 +7,19 @@
 //! which names it, and none has a span.
 
 use super::client_quotas::note_address;
-use super::count_requests::method_label;
 #[cfg(feature = "otel")]
 use super::trace_context::exported;
 use super::trace_context::{TRACEPARENT, TraceContext};
 use crate::http::extract::instance::Instance;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
-use axum::extract::Request;
+use axum::body::{Body, HttpBody};
+use axum::extract::{MatchedPath, Request};
+use axum::http::Method;
 use axum::response::Response;
 use bagtrack_api::ProblemKind as Kind;
-use bagtrack_sessions::clock;
-use bagtrack_sessions::short_id;
+use bagtrack_sessions::{clock, short_id};
+use http_body_util::BodyExt;
 use percent_encoding::percent_decode_str;
 use std::net::IpAddr;
 use tracing::field::Empty;
@@ -30,6 +31,7 @@ const MAX_LOGGED_PATH: usize = 200;
 const SHOWN_OF_ID: usize = 8;
 const PROBES: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
 
+/// Writes the line of a request in the log, in a span of its own.
 pub async fn log_request(
     state: &AppState,
     mut request: Request,
@@ -101,6 +103,57 @@ fn shortened(text: &str) -> String {
     match text.char_indices().nth(SHOWN_OF_ID) {
         Some((end, _)) => format!("{}…", &text[..end]),
         None => text.to_owned(),
+    }
+}
+
+/// Counts requests and their bytes. It has to see the matched route.
+pub async fn count_request(
+    state: &AppState,
+    request: Request,
+    next: impl AsyncFnOnce(Request) -> Response,
+) -> Response {
+    let started = clock::now();
+    let method = method_label(request.method());
+    let route = request.extensions().get::<MatchedPath>().cloned();
+    let received = state.metrics.received_bytes.clone();
+    let request = request.map(|body| match body.is_end_stream() {
+        true => body,
+        false => Body::new(body.inspect_frame(move |frame| {
+            let bytes = frame.data_ref().map_or(0, |data| data.len());
+            received.increment(bytes as u64);
+        })),
+    });
+    let response = next(request).await;
+    let sent = state.metrics.sent_bytes.clone();
+    let response = match response.body().size_hint().exact() {
+        Some(bytes) => {
+            sent.increment(bytes);
+            response
+        }
+        // Lines count as they are sent.
+        None => response.map(|body| {
+            Body::new(body.inspect_frame(move |frame| {
+                let bytes = frame.data_ref().map_or(0, |data| data.len());
+                sent.increment(bytes as u64);
+            }))
+        }),
+    };
+    let route = route.as_ref().map_or("none", MatchedPath::as_str);
+    let (status, seconds) = (response.status().as_u16(), started.elapsed().as_secs_f64());
+    state.metrics.answered(method, route, status, seconds);
+    response
+}
+
+/// Clients may send any word as the method.
+fn method_label(method: &Method) -> &'static str {
+    match *method {
+        Method::GET => "GET",
+        Method::HEAD => "HEAD",
+        Method::POST => "POST",
+        Method::PUT => "PUT",
+        Method::DELETE => "DELETE",
+        Method::OPTIONS => "OPTIONS",
+        _ => "other",
     }
 }
 
