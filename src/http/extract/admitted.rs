@@ -2,9 +2,8 @@
 //! session's state.
 
 use super::answer_form::AnswerForm;
-use super::caller::{Caller, client_of};
+use super::caller::{Caller, SessionPath, client_of};
 use super::instance::Instance;
-use super::session_path::SessionPath;
 use super::texts::Texts;
 use super::uploaded::Upload;
 use crate::http::problems::problem::Problem;

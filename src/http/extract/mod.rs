@@ -26,7 +26,6 @@ mod misnamed;
 mod multipart;
 pub mod overrides;
 pub mod query;
-pub mod session_path;
 pub mod texts;
 pub mod uploaded;
 pub mod video_frames;

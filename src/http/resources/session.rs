@@ -1,7 +1,7 @@
 //! `GET` and `DELETE /sessions/{id}`.
 
+use crate::http::extract::caller::SessionPath;
 use crate::http::extract::query::NoQuery;
-use crate::http::extract::session_path::SessionPath;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::answer;
 use crate::http::respond::json::Json;

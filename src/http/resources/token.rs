@@ -1,8 +1,8 @@
 //! `POST /sessions/{id}/token`: a token with which a web page may use this session, and nothing else.
 
 use crate::http::extract::caller::Caller;
+use crate::http::extract::caller::SessionPath;
 use crate::http::extract::query::QuerySettings;
-use crate::http::extract::session_path::SessionPath;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::json::Json;
 use crate::http::state::AppState;
