@@ -3,7 +3,7 @@
 
 use crate::http::extract::instance::Instance;
 use crate::http::problems::problem::Problem;
-use crate::http::respond::json::Json;
+use crate::http::respond::body::Json;
 use crate::http::state::AppState;
 use axum::body::Body;
 use axum::extract::Request;

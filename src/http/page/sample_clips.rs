@@ -5,7 +5,7 @@
 //! so it is drawn then.
 
 use crate::http::problems::problem::Problem;
-use crate::http::respond::json::Json;
+use crate::http::respond::body::Json;
 use axum::body::Bytes;
 use axum::extract::Path;
 use axum::extract::rejection::PathRejection;

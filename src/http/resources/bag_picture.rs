@@ -4,7 +4,7 @@ use crate::drawing::ContactSheet;
 use crate::http::extract::admitted::ReadRequest;
 use crate::http::extract::query::QuerySettings;
 use crate::http::problems::problem::Problem;
-use crate::http::respond::charged_body::{ChargedBody, charged_body};
+use crate::http::respond::body::{ChargedBody, charged_body};
 use crate::http::state::AppState;
 use axum::extract::State;
 use bagtrack_api::requests::{BagSettings, BinaryBody};

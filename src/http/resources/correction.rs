@@ -4,7 +4,7 @@ use crate::http::extract::admitted::SessionRequest;
 use crate::http::extract::overrides::rect;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::{answer, with_standing};
-use crate::http::respond::json::Json;
+use crate::http::respond::body::Json;
 use crate::http::state::AppState;
 use axum::extract::State;
 use axum::response::Response;

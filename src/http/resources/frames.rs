@@ -5,7 +5,7 @@ use crate::http::extract::answer_form::AnswerForm;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::annotated_image::answer_drawn;
 use crate::http::respond::answer::{answer_bytes, answers, with_standing};
-use crate::http::respond::json;
+use crate::http::respond::body::charged_json;
 use crate::http::state::AppState;
 use axum::extract::State;
 use axum::response::Response;
@@ -99,7 +99,7 @@ async fn respond_at_once(state: &AppState, request: FramesRequest) -> Result<Res
     let mut charge = state.charge(&request.client);
     charge.grow(answer_bytes(batch.files.len(), targets))?;
     let tracked = state.service.advance(request.permit, queue, batch).await?;
-    let answers = json::charged(&answers(&tracked.estimates, None), charge)?;
+    let answers = charged_json(&answers(&tracked.estimates, None), charge)?;
     Ok(with_standing(tracked.replayed, tracked.checkpoint, answers))
 }
 

@@ -1,7 +1,7 @@
 //! `/healthz` and `/readyz`: whether the process runs, and whether it is ready for requests.
 
 use crate::http::problems::problem::Problem;
-use crate::http::respond::json::Json;
+use crate::http::respond::body::Json;
 use crate::http::state::AppState;
 use axum::extract::State;
 use bagtrack_api::Health;

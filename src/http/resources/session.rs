@@ -4,7 +4,7 @@ use crate::http::extract::caller::SessionPath;
 use crate::http::extract::query::NoQuery;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::answer;
-use crate::http::respond::json::Json;
+use crate::http::respond::body::Json;
 use crate::http::state::AppState;
 use axum::extract::State;
 use axum::http::StatusCode;

@@ -11,8 +11,8 @@ use crate::http::extract::video_place::VideoPlace;
 use crate::http::extract::video_range::{RangeFrames, VideoRange};
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::{answer_bytes, answers};
-use crate::http::respond::charged_body::ChargedBody;
-use crate::http::respond::json;
+use crate::http::respond::body::ChargedBody;
+use crate::http::respond::body::charged_json;
 use crate::http::respond::ndjson;
 use crate::http::respond::video_answer;
 use crate::http::state::AppState;
@@ -223,5 +223,5 @@ fn body(tracked: &TrackedAway, mut charge: Charge) -> Result<ChargedBody, Proble
         answers: answers(estimates, tracked.warnings.clone()),
         snapshot: STANDARD.encode(snapshot),
     };
-    json::charged(&tracked, charge)
+    charged_json(&tracked, charge)
 }

@@ -2,7 +2,7 @@
 
 use super::track_video::{TrackedFrame, VideoTrack};
 use crate::http::problems::problem::Problem;
-use crate::http::respond::charged_body::charged_body;
+use crate::http::respond::body::charged_body;
 use axum::response::{IntoResponse, Response};
 use bagtrack_api::ProblemKind as Kind;
 use bagtrack_api::media_types::LINES;

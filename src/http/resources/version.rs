@@ -1,7 +1,7 @@
 //! `GET /version`.
 
 use crate::http::extract::query::NoQuery;
-use crate::http::respond::json::Json;
+use crate::http::respond::body::Json;
 use bagtrack_api::Version;
 
 /// See which version answers

@@ -1,7 +1,7 @@
 //! The answer to a frame as the frame itself, with box, score and particles drawn.
 
 use super::answer::{answer, with_standing};
-use super::charged_body::charged_body;
+use super::body::charged_body;
 use crate::drawing::{self, Drawn, Picture};
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;

@@ -1,7 +1,7 @@
 //! The answer to a request that opens a session.
 
 use super::answer::{rect, with_standing};
-use super::json::Json;
+use super::body::Json;
 use axum::http::StatusCode;
 use axum::http::header::LOCATION;
 use axum::response::Response;

@@ -5,8 +5,7 @@
 
 pub mod annotated_image;
 pub mod answer;
-pub mod charged_body;
+pub mod body;
 pub mod created_session;
-pub mod json;
 pub mod ndjson;
 pub mod video_answer;

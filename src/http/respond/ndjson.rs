@@ -4,7 +4,7 @@
 //! to the request; that of a later one is the last line, a problem document. The next frame is tracked when the line
 //! before it has been taken, so a slow reader holds no lines in memory.
 
-use super::json;
+use super::body::json_line;
 use crate::http::extract::instance::Instance;
 use crate::http::problems::problem::{Effect, Problem};
 use crate::http::state::AppState;
@@ -60,6 +60,6 @@ pub async fn respond<F: FrameSequence>(
 }
 
 fn line(value: &impl Serialize) -> Result<Bytes, Problem> {
-    let line = json::line(value).map(Bytes::from);
+    let line = json_line(value).map(Bytes::from);
     line.map_err(|error| Problem::internal(Arc::new(error)))
 }

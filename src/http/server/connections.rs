@@ -6,7 +6,7 @@
 use crate::http::metrics::registry::Metrics;
 use crate::http::middleware::response_headers::{HEADERS, STRICT};
 use crate::http::problems::problem::Problem;
-use crate::http::respond::json;
+use crate::http::respond::body::json_line;
 #[cfg(feature = "tls")]
 use crate::http::server::router::https_only;
 use crate::http::server::router::probes_only;
@@ -113,7 +113,7 @@ fn refusal(problem: &Problem, client: IpAddr, metrics: &Metrics) -> Vec<u8> {
     let (kind, status) = (problem.kind().slug(), problem.kind().status());
     tracing::info!(id, %client, kind, status, "connection refused");
     let document = problem.document("", "/".to_owned(), id.clone());
-    let body = json::line(&document).unwrap_or_default();
+    let body = json_line(&document).unwrap_or_default();
     let retry = problem.retry_seconds();
     let retry = retry.map_or(String::new(), |seconds| {
         format!("retry-after: {seconds}\r\n")
