@@ -6,7 +6,7 @@ use crate::http::extract::overrides;
 use crate::http::extract::texts::Texts;
 use crate::http::extract::uploaded::Upload;
 use crate::http::problems::problem::Problem;
-use crate::http::respond::created_session::created;
+use crate::http::respond::answer::created;
 use crate::http::state::AppState;
 use axum::extract::{FromRequest, FromRequestParts, Path, Request, State};
 use axum::http::request::Parts;

@@ -6,6 +6,5 @@
 pub mod annotated_image;
 pub mod answer;
 pub mod body;
-pub mod created_session;
 pub mod ndjson;
 pub mod video_answer;
