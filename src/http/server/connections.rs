@@ -3,7 +3,7 @@
 //! `axum::serve` has no time limit for request heads: a client that sends half a line holds its connection for ever.
 //! hyper's connection builder has one. Connections are [counted](Connections), too.
 
-use crate::http::metrics::registry::Metrics;
+use crate::http::metrics::Metrics;
 use crate::http::middleware::response_headers::{HEADERS, STRICT};
 use crate::http::problems::problem::Problem;
 use crate::http::respond::body::json_line;
