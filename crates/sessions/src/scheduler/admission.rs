@@ -5,12 +5,11 @@
 //! that times out or whose client goes away does not end work that has begun, so its permits stay taken until that work
 //! has ended, and never more threads work than there are workers.
 
-use super::executor::Executor;
+use super::executor::{AfterWork, Executor};
 use super::fair_queue::{FairQueue, WorkerSlot};
 use super::flows::Flow;
 use super::places::Places;
 use super::queue_permit::{QueuePermit, Reservation, Ticket};
-use super::workers::AfterWork;
 use crate::planted::PlantedFault;
 use crate::sync::{Mutex, lock};
 use std::any::Any;

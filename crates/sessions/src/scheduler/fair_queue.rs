@@ -12,10 +12,8 @@
 //! Work on several frames gives its worker up between two of them when another flow has the better claim. Its thread
 //! waits meanwhile, so there are more threads than workers, and a flow begins no second one of these while others do.
 
-use super::cpu_time::CpuClock;
-use super::executor::Executor;
+use super::executor::{AfterWork, CpuClock, Executor};
 use super::flows::{Flow, Flows, Held, Job, Next, Request, SizeClass};
-use super::workers::AfterWork;
 use crate::sync::{self, Mutex, lock};
 use std::fmt;
 use std::sync::Arc;

@@ -5,10 +5,10 @@
 
 use super::admission::{Admission, NoOutcome};
 use super::budget::{Budget, Charge};
+use super::executor::Workers;
 use super::flows::{Flow, SizeClass};
 use super::places::Places;
 use super::work_limit::{CpuSpent, Stopped, WorkLimit, WorkMeter};
-use super::workers::Workers;
 use crate::clock;
 use crate::interleavings::{explore, join};
 use crate::sync::atomic::{AtomicUsize, Ordering};

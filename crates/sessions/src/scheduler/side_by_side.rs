@@ -3,7 +3,7 @@
 //! Each thread takes the next part until none is left. So a worker that comes late, or has to go, delays no part but
 //! the one that it is at.
 
-use super::cpu_time::CpuClock;
+use super::executor::CpuClock;
 use crate::sync::{Condvar, Mutex, PoisonError, lock};
 use std::any::Any;
 use std::collections::VecDeque;

@@ -3,7 +3,7 @@
 //! A thread cannot be stopped from outside. So the work itself asks, before each frame, whether it should go on. There
 //! it also lets other clients' requests go first.
 
-use super::cpu_time::CpuClock;
+use super::executor::CpuClock;
 use super::fair_queue::WorkerSlot;
 use super::side_by_side::Parts;
 use crate::clock::{self, Instant};
