@@ -9,7 +9,6 @@
 
 pub(crate) mod admission;
 pub(crate) mod budget;
-pub(crate) mod charged_bytes;
 mod controlled_delay;
 pub(crate) mod executor;
 pub(crate) mod fair_queue;
