@@ -23,7 +23,6 @@ mod start;
 mod sync;
 mod track;
 mod tracking_metrics;
-mod turn;
 
 pub use error::{ActError, FrameFault, FramesError, OpenError, QuotaExhausted, TrackError};
 pub use frames::{
