@@ -2,7 +2,7 @@
 //! user gives.
 
 use super::error::{FrameFault, FramesError};
-use super::tracking_metrics::TrackingMetrics;
+use super::service::TrackingMetrics;
 use crate::replay::{Answered, replayed};
 use crate::streams::StreamPlace;
 use crate::targets::TargetsError;

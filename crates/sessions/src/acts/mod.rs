@@ -22,7 +22,6 @@ mod service;
 mod start;
 mod sync;
 mod track;
-mod tracking_metrics;
 
 pub use error::{ActError, FrameFault, FramesError, OpenError, QuotaExhausted, TrackError};
 pub use frames::{
@@ -30,7 +29,6 @@ pub use frames::{
 };
 pub use idempotency::{CreationKey, IdempotencyStore};
 pub use open::{OpenRequest, Opened, SessionQuota};
-pub use service::{ServiceParts, ServiceSettings, SessionService};
+pub use service::{ServiceParts, ServiceSettings, SessionService, TrackingMetrics};
 pub use start::Start;
 pub use track::{TrackFrom, TrackedAway};
-pub use tracking_metrics::TrackingMetrics;
