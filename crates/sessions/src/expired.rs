@@ -1,6 +1,6 @@
 //! The ids of sessions that have expired, for a while: a client whose session has expired is told so.
 
-use super::opening::Owner;
+use super::session::Owner;
 use std::collections::{HashMap, VecDeque};
 use std::time::Duration;
 use uuid::Uuid;

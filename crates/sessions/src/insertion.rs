@@ -1,11 +1,10 @@
 //! Adding a session to the map, and making room for it.
 
-use super::opening::Opening;
 use super::random::random;
 use super::registry::{Registry, TooManySessions};
 use super::scheduler::budget::Charge;
 use super::scheduler::queue_permit::Reservation;
-use super::session::{NewSession, Session};
+use super::session::{NewSession, Opening, Session};
 use super::state::SessionState;
 use super::sync::lock;
 use std::collections::hash_map::Entry;

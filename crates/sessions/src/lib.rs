@@ -28,7 +28,6 @@ mod insertion;
 #[cfg(all(test, feature = "shuttle"))]
 mod interleavings;
 mod mac;
-mod opening;
 mod per_target;
 mod planted;
 pub mod random;
@@ -54,7 +53,6 @@ pub use acts::{
 pub use clock::Clock;
 pub use insertion::InsertError;
 pub use mac::{MAC_BYTES, MacKeys};
-pub use opening::{Opening, Owner};
 pub use per_target::{MAX_TARGETS, PerTarget};
 #[cfg(feature = "planted-faults")]
 pub use planted::{PlantedFault, plant};
@@ -68,7 +66,7 @@ pub use scheduler::flows::Flow;
 pub use scheduler::queue_permit::{QueuePermit, Reservation, Ticket};
 pub use scheduler::work_limit::{CpuSpent, Stopped, WorkLimit, WorkMeter};
 pub use selection::Selection;
-pub use session::{Lease, NewSession, Session, short_id};
+pub use session::{Lease, NewSession, Opening, Owner, Session, short_id};
 pub use session_permit::{LockedSession, SessionBusy, SessionClosed, SessionPermit};
 pub use snapshot::{
     KEY_CONTEXT as SNAPSHOT_KEY_CONTEXT, MAGIC as SNAPSHOT_MAGIC, SnapshotError, is_snapshot,

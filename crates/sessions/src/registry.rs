@@ -2,9 +2,8 @@
 
 use super::clock::Clock;
 use super::expired::ExpiredIds;
-use super::opening::Owner;
 use super::scheduler::budget::Budget;
-use super::session::{Lease, Session};
+use super::session::{Lease, Owner, Session};
 use super::store::SessionName;
 use super::sync::{Mutex, lock};
 use std::collections::HashMap;
