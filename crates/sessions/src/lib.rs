@@ -28,7 +28,6 @@ mod insertion;
 #[cfg(all(test, feature = "shuttle"))]
 mod interleavings;
 mod mac;
-mod per_target;
 mod planted;
 pub mod random;
 mod registry;
@@ -53,7 +52,6 @@ pub use acts::{
 pub use clock::Clock;
 pub use insertion::InsertError;
 pub use mac::{MAC_BYTES, MacKeys};
-pub use per_target::{MAX_TARGETS, PerTarget};
 #[cfg(feature = "planted-faults")]
 pub use planted::{PlantedFault, plant};
 pub use registry::{NoSession, Registry, TooManySessions};
@@ -83,5 +81,6 @@ pub use store::{NewHash, RedisAddress, RedisAddressError, RedisStore, ScriptServ
 pub use store::{record_of_row, row_and_state};
 pub use streams::{OpenStreams, StreamPlace};
 pub use targets::{
-    Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format, largest_format,
+    Boxes, Correction, Estimates, MAX_LIST_BYTES, MAX_TARGETS, PerTarget, StartError, frame_format,
+    largest_format,
 };

@@ -4,9 +4,8 @@
 //! request again: the same bytes under the same number get the stored answer. The answers to the last requests are
 //! kept, so a request with several frames can be repeated too, and one after which others were answered.
 
-use super::per_target::PerTarget;
 use super::planted::PlantedFault;
-use super::targets::{Correction, Estimates};
+use super::targets::{Correction, Estimates, PerTarget};
 use bagtrack_tracker::{Estimate, Rect};
 use serde::{Deserialize, Serialize};
 

@@ -12,10 +12,9 @@
 
 use super::compression;
 use super::mac::{MAC_BYTES, MacKeys};
-use super::per_target::{MAX_TARGETS, PerTarget};
 use super::replay::{Answered, Fingerprint, TargetAnswer};
 use super::state::SessionState;
-use super::targets::Targets;
+use super::targets::{MAX_TARGETS, PerTarget, Targets};
 use bagtrack_tracker::{Expert, SNAPSHOT_MAGIC as TRACKER_MAGIC, Tracker, TrackerError};
 use postcard::take_from_bytes;
 use serde::Serialize;

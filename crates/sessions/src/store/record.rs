@@ -1,9 +1,9 @@
 //! What the store holds of a session.
 
-use crate::per_target::{MAX_TARGETS, PerTarget};
 use crate::planted::PlantedFault;
 use crate::random::random;
 use crate::session::{Opening, Owner};
+use crate::targets::{MAX_TARGETS, PerTarget};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 use uuid::Uuid;
