@@ -1,7 +1,6 @@
 //! The steps from bytes to a frame: sniff, read the structure, limit; then decode strictly, luma and chroma, EXIF
 //! orientation, downscale.
 
-use super::catch_decoder_panic::catch_decoder_panic;
 use super::error::IngestError;
 use super::jpeg::Jpeg;
 use super::limits::Limits;
@@ -12,6 +11,7 @@ use super::scratch::Scratch;
 use super::sniff::{self, Format};
 use bagtrack_tracker::{Frame, FrameFormat};
 use std::cell::RefCell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 thread_local! {
     static SCRATCH: RefCell<Scratch> = RefCell::default();
@@ -134,4 +134,34 @@ pub fn decode_to(
 /// Keeps the memory of a frame that is no longer needed, for the next one that this thread decodes.
 pub fn recycle(frame: Frame) {
     SCRATCH.with_borrow_mut(|scratch| scratch.planes = frame.into_planes());
+}
+
+/// Runs a decoder, with a panic in it turned into an error: decoders index by numbers that a hostile file holds. The file
+/// is damaged then, and the service goes on.
+fn catch_decoder_panic<T>(
+    format: Format,
+    decode: impl FnOnce() -> Result<T, IngestError>,
+) -> Result<T, IngestError> {
+    // Whatever `decode` borrows is dropped or overwritten after an error, so no half-changed value is read.
+    catch_unwind(AssertUnwindSafe(decode))
+        .unwrap_or_else(|_| Err(format.damaged("its structure is not supported")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_a_damaged_image() {
+        let result: Result<(), IngestError> = catch_decoder_panic(Format::WebP, || {
+            let nothing: [u8; 0] = [];
+            let index = std::hint::black_box(3);
+            Err(Format::WebP.damaged(nothing[index..].len().to_string()))
+        });
+        let error = result.expect_err("it panicked");
+        assert_eq!(
+            error.to_string(),
+            "the WebP image cannot be decoded: its structure is not supported"
+        );
+    }
 }

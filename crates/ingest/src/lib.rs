@@ -28,7 +28,6 @@
 //! assert_eq!(error, IngestError::UnreadFormat("text"));
 //! ```
 
-mod catch_decoder_panic;
 mod components;
 mod decode;
 mod error;
