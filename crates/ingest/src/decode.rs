@@ -7,8 +7,8 @@ use super::limits::Limits;
 use super::orientation;
 use super::png_chunks::Png;
 use super::raster::{self, WebPFile};
-use super::scratch::Scratch;
 use super::sniff::{self, Format};
+use super::stored_image::Scratch;
 use bagtrack_tracker::{Frame, FrameFormat};
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -136,8 +136,8 @@ pub fn recycle(frame: Frame) {
     SCRATCH.with_borrow_mut(|scratch| scratch.planes = frame.into_planes());
 }
 
-/// Runs a decoder, with a panic in it turned into an error: decoders index by numbers that a hostile file holds. The file
-/// is damaged then, and the service goes on.
+/// Runs a decoder, with a panic in it turned into an error: decoders index by numbers that a hostile file holds. The
+/// file is damaged then, and the service goes on.
 fn catch_decoder_panic<T>(
     format: Format,
     decode: impl FnOnce() -> Result<T, IngestError>,

@@ -39,7 +39,6 @@ mod orientation;
 mod png_chunks;
 mod prefix_codes;
 mod raster;
-mod scratch;
 mod sniff;
 mod stored_image;
 #[cfg(feature = "turbo")]
