@@ -9,7 +9,7 @@
 //! that has most. A connection with a request in progress is never closed for another one.
 
 use super::activity::Activity;
-use super::address::{customer_address, wider_networks};
+use super::client_address::{customer_address, wider_networks};
 use ipnet::Ipv6Net;
 use metrics::Counter;
 use std::cmp::Reverse;

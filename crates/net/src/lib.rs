@@ -1,7 +1,7 @@
 //! The connections of a service: how many there are, what each is doing, and how slowly its client may read and write.
 //!
 //! In: sockets. Out: the bytes of requests, and of WebSockets' messages ([`Fragments`]), for whom serves them; and
-//! whose they are ([`client_address`]).
+//! whose they are ([`client_address()`]).
 //!
 //! What can go wrong: a client sends its head or reads its answer slowly, opens many connections, keeps idle ones, or
 //! begins large messages on many streams. [`LeastRate`] and the time limits for handshakes and heads bound the first,
@@ -10,25 +10,25 @@
 #![warn(clippy::disallowed_methods)]
 
 mod activity;
-mod address;
 #[cfg(feature = "tls")]
 mod certificate;
+mod client_address;
 mod connection_hold;
 mod connection_io;
 mod connections;
-mod forwarded;
 mod fragments;
 mod handshake;
 mod least_rate;
 
 pub use activity::Activity;
-pub use address::{Peer, customer_address, wider_networks};
 #[cfg(feature = "tls")]
 pub use certificate::{Certificate, CertificateError};
+pub use client_address::{
+    Peer, client_address, customer_address, is_forwarded, is_trusted, wider_networks,
+};
 pub use connection_hold::ConnectionHold;
 pub use connection_io::{ClientLimits, ConnectionIo};
 pub use connections::{ConnectionPermit, Connections, NoRoom};
-pub use forwarded::{client_address, is_forwarded, is_trusted};
 pub use fragments::{Fragments, MessageRate, MessageTooSlow, Rates};
 #[cfg(feature = "tls")]
 pub use handshake::MAX_UNSENT_BYTES;

@@ -1,15 +1,17 @@
-//! The client's address behind trusted proxies: from `Forwarded` (RFC 7239) or `X-Forwarded-For`.
+//! Whose a request is: the address of its client, behind trusted proxies, and of the customer that has the address.
 //!
-//! Each proxy adds the address that it was called from at the end. So the list is read from its end, as long as the
-//! address before was a trusted proxy's: the first other address is the client's. What stands before that, the client
-//! may have written itself.
+//! Proxies tell it by `Forwarded` (RFC 7239) or `X-Forwarded-For`. Each adds the address that it was called from at the
+//! end. So the list is read from its end, as long as the address before was a trusted proxy's: the first other address
+//! is the client's. What stands before that, the client may have written itself.
 //!
 //! A proxy that adds to one of the two headers passes the other one on as the client wrote it. So if both are there and
 //! disagree, neither is believed, and the client is the proxy.
+//!
+//! A provider gives a customer a whole network of IPv6.
 
 use axum::http::HeaderMap;
 use axum::http::header::FORWARDED;
-use ipnet::IpNet;
+use ipnet::{IpNet, Ipv6Net};
 use std::net::{IpAddr, SocketAddr};
 
 const X_FORWARDED_FOR: &str = "x-forwarded-for";
@@ -81,6 +83,37 @@ fn parse(text: &str) -> Option<IpAddr> {
     let with_port = || text.parse().ok().map(|address: SocketAddr| address.ip());
     let address: Option<IpAddr> = text.parse().ok().or_else(bracketed).or_else(with_port);
     address.map(|address| address.to_canonical())
+}
+
+/// The address at the other end of a connection.
+#[derive(Debug, Clone, Copy)]
+pub struct Peer(pub SocketAddr);
+
+/// Bits of an IPv6 address that a provider gives to one customer at least (RFC 6177).
+const IPV6_PREFIX: u8 = 64;
+/// Those that some customers get.
+const WIDER_PREFIXES: [u8; 2] = [48, 56];
+
+/// What the addresses of one customer have in common: an IPv4 address, or the first address of an IPv6 network of 64
+/// bits.
+pub fn customer_address(address: IpAddr) -> IpAddr {
+    match address.to_canonical() {
+        IpAddr::V6(address) => {
+            let network = Ipv6Net::new(address, IPV6_PREFIX);
+            network.map_or(address, |network| network.network()).into()
+        }
+        address => address,
+    }
+}
+
+/// The networks of IPv6 that the address is in, which its provider may have given to one customer too.
+pub fn wider_networks(address: IpAddr) -> impl Iterator<Item = Ipv6Net> {
+    let address = match address {
+        IpAddr::V6(address) => Some(address),
+        IpAddr::V4(_) => None,
+    };
+    let networks = WIDER_PREFIXES.map(|bits| Some(Ipv6Net::new(address?, bits).ok()?.trunc()));
+    networks.into_iter().flatten()
 }
 
 #[cfg(test)]
@@ -158,5 +191,18 @@ mod tests {
         ] {
             assert_eq!(client(peer, headers), expected, "{peer} {headers:?}");
         }
+    }
+
+    #[test]
+    fn an_ipv6_network_is_one_customer_and_a_mapped_address_is_its_ipv4() {
+        let at = |text: &str| customer_address(text.parse().unwrap());
+        assert_eq!(at("2001:db8:1:2:3::4"), at("2001:db8:1:2::"));
+        assert_ne!(at("2001:db8:1:2::"), at("2001:db8:1:3::"));
+        assert_eq!(at("::ffff:192.0.2.7"), at("192.0.2.7"));
+        assert_ne!(at("192.0.2.7"), at("192.0.2.8"));
+        let networks = |text: &str| wider_networks(at(text)).collect::<Vec<_>>();
+        assert_eq!(networks("2001:db8:1:2::9"), networks("2001:db8:1:77::"));
+        assert_ne!(networks("2001:db8:1:2::9"), networks("2001:db8:1:102::"));
+        assert!(networks("192.0.2.7").is_empty());
     }
 }
