@@ -7,17 +7,28 @@
 //!
 //! Whoever may have no more loses the one of its own that was idle longest. When all are taken, it is one of the client
 //! that has most. A connection with a request in progress is never closed for another one.
+//!
+//! Each has a [hold](ConnectionHold) on its place until it ends, whoever serves it: HTTP first, then perhaps a stream
+//! that takes it over.
 
 use super::activity::Activity;
 use super::client_address::{customer_address, wider_networks};
+use super::connection_io::ConnectionIo;
+use axum::body::Body;
+use hyper::body::Incoming;
+use hyper::server::conn::http1::UpgradeableConnection;
+use hyper::service::HttpService;
+use hyper_util::rt::TokioIo;
 use ipnet::Ipv6Net;
 use metrics::Counter;
 use std::cmp::Reverse;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
+use std::error::Error;
 use std::net::IpAddr;
+use std::pin::pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use tokio::sync::Notify;
+use tokio::sync::{Notify, watch};
 
 /// Why there is no room for a connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -189,6 +200,89 @@ impl Drop for ConnectionPermit {
     fn drop(&mut self) {
         self.connections.open().remove(self.number);
         self.connections.freed.notify_one();
+    }
+}
+
+/// A connection's place among the open ones, and how it learns that it is to end. Clones are the same connection.
+#[derive(Debug, Clone)]
+pub struct ConnectionHold {
+    permit: Arc<ConnectionPermit>,
+    ending: watch::Receiver<bool>,
+    cut_off: watch::Receiver<()>,
+}
+
+impl ConnectionHold {
+    /// For a connection that ends in order when `ending` turns true, and at once when `cut_off` loses its sender.
+    pub fn new(
+        permit: ConnectionPermit,
+        ending: watch::Receiver<bool>,
+        cut_off: watch::Receiver<()>,
+    ) -> Self {
+        Self {
+            permit: Arc::new(permit),
+            ending,
+            cut_off,
+        }
+    }
+
+    /// What the connection is doing.
+    pub fn activity(&self) -> &Arc<Activity> {
+        &self.permit.activity
+    }
+
+    /// Waits until the service asks its connections to end.
+    pub async fn ending(&mut self) {
+        // Without its sender the service is gone.
+        let _ = self.ending.wait_for(|ending| *ending).await;
+    }
+
+    /// Waits until the connection is cut off.
+    pub async fn cut_off(&mut self) {
+        while self.cut_off.changed().await.is_ok() {}
+    }
+
+    /// What comes of `beginning`, unless the connection has to end before that.
+    pub async fn begin<T>(&mut self, beginning: impl Future<Output = T>) -> Option<T> {
+        let activity = self.activity().clone();
+        let mut cut_off = self.clone();
+        tokio::select! {
+            biased;
+            () = cut_off.cut_off() => None,
+            () = self.ending() => None,
+            () = activity.shed.notified() => None,
+            begun = beginning => Some(begun),
+        }
+    }
+
+    /// Serves HTTP until the connection ends, or a stream has taken it over.
+    pub async fn serve<S>(mut self, connection: UpgradeableConnection<TokioIo<ConnectionIo>, S>)
+    where
+        S: HttpService<Incoming, ResBody = Body>,
+        S::Error: Into<Box<dyn Error + Send + Sync>>,
+    {
+        let activity = self.activity().clone();
+        let mut connection = pin!(connection);
+        let mut cut_off = self.clone();
+        let mut asked = false;
+        loop {
+            tokio::select! {
+                biased;
+                () = cut_off.cut_off() => return tracing::warn!("connection cut off"),
+                () = self.ending(), if !asked => {
+                    asked = true;
+                    connection.as_mut().graceful_shutdown();
+                }
+                () = activity.shed.notified() => {
+                    return tracing::debug!("idle connection closed for another");
+                }
+                result = &mut connection => {
+                    if let Err(error) = result {
+                        tracing::debug!(%error, "connection ended");
+                    }
+                    return;
+                }
+            }
+        }
     }
 }
 

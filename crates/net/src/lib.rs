@@ -13,7 +13,6 @@ mod activity;
 #[cfg(feature = "tls")]
 mod certificate;
 mod client_address;
-mod connection_hold;
 mod connection_io;
 mod connections;
 mod fragments;
@@ -26,9 +25,8 @@ pub use certificate::{Certificate, CertificateError};
 pub use client_address::{
     Peer, client_address, customer_address, is_forwarded, is_trusted, wider_networks,
 };
-pub use connection_hold::ConnectionHold;
 pub use connection_io::{ClientLimits, ConnectionIo};
-pub use connections::{ConnectionPermit, Connections, NoRoom};
+pub use connections::{ConnectionHold, ConnectionPermit, Connections, NoRoom};
 pub use fragments::{Fragments, MessageRate, MessageTooSlow, Rates};
 #[cfg(feature = "tls")]
 pub use handshake::MAX_UNSENT_BYTES;
