@@ -3,8 +3,7 @@
 //! Quotas are shares of what the service has: sessions and their bytes, requests in flight, bytes of uploads, and
 //! frames and requests a second.
 
-use super::client::Client;
-use super::holdings::Holdings;
+use super::clients::{Client, Holdings};
 use super::rates::{self, FrameRate, Rate, RateExceeded};
 use super::video_places::VideoPlaces;
 use bagtrack_net::MessageRate;

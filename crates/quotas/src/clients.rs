@@ -1,15 +1,110 @@
-//! The accounts of all clients.
+//! Who is one client, as far as quotas and turns go, and what is held for each and for all of them.
 
 use super::account::{Account, Quotas};
-use super::client::Client;
-use super::holdings::Holdings;
 use bagtrack_config::Config;
-use bagtrack_sessions::{Flow, MAX_LIST_BYTES};
+use bagtrack_net::{customer_address, wider_networks};
+use bagtrack_sessions::{Budget, Flow, MAX_LIST_BYTES};
 use ipnet::Ipv6Net;
 use std::collections::HashMap;
+use std::fmt;
+use std::net::IpAddr;
 use std::num::NonZeroU32;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use uuid::Uuid;
+
+/// A client: who shares quotas and turns.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Client {
+    /// The name of an API key.
+    Key(Arc<str>),
+    /// A page with a token of this key for this session: a part of the client with the key.
+    Page(Arc<str>, Uuid),
+    /// An IPv4 address, or the first address of an IPv6 network of 64 bits.
+    Address(IpAddr),
+}
+
+impl Client {
+    /// The client at this address.
+    pub fn at(address: IpAddr) -> Self {
+        Self::Address(customer_address(address))
+    }
+
+    /// The networks that the client is in, which its provider may have given to one customer too.
+    pub fn networks(&self) -> impl Iterator<Item = Ipv6Net> {
+        let address = match self {
+            Self::Address(address) => Some(*address),
+            Self::Key(_) | Self::Page(..) => None,
+        };
+        address.into_iter().flat_map(wider_networks)
+    }
+
+    /// The key, where one or a token of it came with the request.
+    pub fn key(&self) -> Option<&Arc<str>> {
+        match self {
+            Self::Key(name) | Self::Page(name, _) => Some(name),
+            Self::Address(_) => None,
+        }
+    }
+}
+
+impl fmt::Display for Client {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Key(name) | Self::Page(name, _) => write!(formatter, "key {name}"),
+            Self::Address(address) => write!(formatter, "address {address}"),
+        }
+    }
+}
+
+/// What is held: for all clients, for a network, or for one client.
+#[derive(Debug, Clone)]
+pub struct Holdings {
+    /// Places of sessions: one for each target.
+    pub sessions: Budget,
+    /// Bytes of the states of sessions.
+    pub session_bytes: Budget,
+    /// Bytes of bodies that have come, and of answers that are not taken.
+    pub upload_bytes: Budget,
+    /// Streams, each of which has a connection.
+    pub streams: Budget,
+}
+
+impl Holdings {
+    /// What all clients may hold together. With a store other sessions leave memory for new ones, so each client's own
+    /// quota is the only bound.
+    pub(super) fn of_all(config: &Config, has_store: bool) -> Self {
+        let of_memory = |most: usize| Budget::new(if has_store { usize::MAX } else { most });
+        Self {
+            sessions: of_memory(config.max_sessions),
+            session_bytes: of_memory(config.session_bytes()),
+            upload_bytes: Budget::new(config.max_upload_bytes),
+            streams: Budget::new(config.max_connections),
+        }
+    }
+
+    /// Whether nothing is held.
+    pub(super) fn is_empty(&self) -> bool {
+        let budgets = [
+            &self.sessions,
+            &self.session_bytes,
+            &self.upload_bytes,
+            &self.streams,
+        ];
+        budgets.iter().all(|budget| budget.held() == 0)
+    }
+
+    /// Those of a network, which has no maximum but what is free.
+    pub(super) fn of_network() -> Self {
+        let budget = || Budget::new(usize::MAX);
+        Self {
+            sessions: budget(),
+            session_bytes: budget(),
+            upload_bytes: budget(),
+            streams: budget(),
+        }
+    }
+}
 
 /// Accounts above which those with nothing in use are forgotten.
 const MAX_IDLE_ACCOUNTS: usize = 1024;

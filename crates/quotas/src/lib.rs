@@ -9,17 +9,13 @@
 #![warn(clippy::disallowed_methods)]
 
 mod account;
-mod client;
 mod clients;
-mod holdings;
 mod rates;
 mod sessions;
 mod video_places;
 
 pub use account::{Account, RequestPermit};
-pub use client::Client;
-pub use clients::Clients;
-pub use holdings::Holdings;
+pub use clients::{Client, Clients, Holdings};
 pub use rates::RateExceeded;
 pub use sessions::ClientSessions;
 pub use video_places::VideoPlaces;
