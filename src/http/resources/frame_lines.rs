@@ -4,7 +4,7 @@
 //! tracked. A video has the processor time of as many requests as its frames would be posted in, and no end but that of
 //! its frames.
 
-use crate::http::extract::admitted::SessionRequest;
+use super::frames::FramesRequest;
 use crate::http::extract::video_frames::VideoFrames;
 use crate::http::extract::video_place::{VideoPlace, count_frame};
 use crate::http::problems::problem::Problem;
@@ -14,7 +14,6 @@ use crate::http::respond::video_answer;
 use crate::http::state::AppState;
 use axum::body::Bytes;
 use axum::response::Response;
-use bagtrack_api::requests::FramesSettings;
 use bagtrack_api::{ProblemKind as Kind, StreamAnswer};
 use bagtrack_ingest::video::VideoFormat;
 use bagtrack_quotas::Client;
@@ -24,15 +23,6 @@ use bagtrack_sessions::{
     check_readable_pixels,
 };
 use std::vec::IntoIter;
-
-pub type FramesRequest = SessionRequest<FramesSettings>;
-
-impl FramesRequest {
-    /// The number of the (first) frame, where the client numbers them.
-    pub fn number(&self) -> Option<u64> {
-        self.upload.settings.frame.map(|number| number.0)
-    }
-}
 
 /// Answers the frames by lines.
 ///

@@ -1,6 +1,7 @@
 //! `POST /sessions/{id}/frames`: the next frame, or several, get their boxes.
 
-use super::frame_lines::{self, FramesRequest};
+use super::frame_lines;
+use crate::http::extract::admitted::SessionRequest;
 use crate::http::extract::answer_form::AnswerForm;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::annotated_image::answer_drawn;
@@ -13,6 +14,15 @@ use bagtrack_api::FrameAnswers;
 use bagtrack_api::openapi::example_frames;
 use bagtrack_api::requests::{BinaryBody, FormBody, FramesSettings, JsonBody};
 use bagtrack_sessions::FrameBatch;
+
+pub type FramesRequest = SessionRequest<FramesSettings>;
+
+impl FramesRequest {
+    /// The number of the (first) frame, where the client numbers them.
+    pub fn number(&self) -> Option<u64> {
+        self.upload.settings.frame.map(|number| number.0)
+    }
+}
 
 type FramesForm = FormBody<FramesSettings>;
 type FramesJson = JsonBody<FramesSettings>;
