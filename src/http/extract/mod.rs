@@ -6,7 +6,7 @@
 //! where a call takes both. Settings come in the query, or as fields of the form or the JSON, which count where the
 //! query has them too. In each of the two a setting may stand once.
 //!
-//! Out: an [`Upload`](uploaded::Upload) with the files and the [`Settings`](bagtrack_api::requests::Settings) type of
+//! Out: an [`Upload`](admitted::Upload) with the files and the [`Settings`](bagtrack_api::requests::Settings) type of
 //! the route. Handlers get it by an extractor, which refuses a request as early as it can: first for its query, then
 //! for what the route needs besides (a session, room for one), then for its announced length, a full queue and the
 //! client's quota, and only then for its body. Memory is charged as the bytes of the body arrive, and a place in the
@@ -27,7 +27,6 @@ mod multipart;
 pub mod overrides;
 pub mod query;
 pub mod texts;
-pub mod uploaded;
 pub mod video_frames;
 pub mod video_place;
 pub mod video_range;

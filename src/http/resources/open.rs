@@ -1,10 +1,10 @@
 //! `POST /sessions` and `PUT /sessions/{id}`: a first frame and a box, or a snapshot, open a session.
 
+use crate::http::extract::admitted::Upload;
 use crate::http::extract::caller::{Caller, client_of};
 use crate::http::extract::idempotency_key;
 use crate::http::extract::overrides;
 use crate::http::extract::texts::Texts;
-use crate::http::extract::uploaded::Upload;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::created;
 use crate::http::state::AppState;

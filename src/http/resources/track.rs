@@ -3,18 +3,15 @@
 
 use super::track_file::TrackFile;
 use super::track_video::{Track, VideoAnswers, VideoTrack};
-use crate::http::extract::admitted::StatelessRequest;
+use crate::http::extract::admitted::{StatelessRequest, Upload};
 use crate::http::extract::overrides;
-use crate::http::extract::uploaded::Upload;
 use crate::http::extract::video_frames::VideoFrames;
 use crate::http::extract::video_place::VideoPlace;
 use crate::http::extract::video_range::{RangeFrames, VideoRange};
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::{answer_bytes, answers};
-use crate::http::respond::body::ChargedBody;
-use crate::http::respond::body::charged_json;
-use crate::http::respond::ndjson;
-use crate::http::respond::video_answer;
+use crate::http::respond::body::{ChargedBody, charged_json};
+use crate::http::respond::{ndjson, video_answer};
 use crate::http::state::AppState;
 use axum::body::Bytes;
 use axum::extract::State;
