@@ -8,8 +8,7 @@
 use super::executor::{AfterWork, Executor};
 use super::fair_queue::{FairQueue, WorkerSlot};
 use super::flows::Flow;
-use super::places::Places;
-use super::queue_permit::{QueuePermit, Reservation, Ticket};
+use super::queue_permit::{Places, QueuePermit, Reservation, Ticket};
 use crate::planted::PlantedFault;
 use crate::sync::{Mutex, lock};
 use std::any::Any;

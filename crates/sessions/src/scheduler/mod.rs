@@ -15,7 +15,6 @@ pub(crate) mod fair_queue;
 pub(crate) mod flows;
 #[cfg(all(test, feature = "shuttle"))]
 mod interleavings;
-mod places;
 pub(crate) mod queue_permit;
 mod side_by_side;
 pub(crate) mod work_limit;
