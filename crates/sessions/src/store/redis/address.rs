@@ -1,6 +1,6 @@
 //! Where the Redis is.
 
-use super::script::ScriptServer;
+use super::scripts::ScriptServer;
 use redis::cluster::ClusterClient;
 use redis::{Client, ErrorKind};
 use std::sync::Arc;

@@ -6,8 +6,7 @@ use super::super::session_store::{
 };
 use super::address::RedisAddress;
 use super::connection::Connection;
-use super::script::{NewHash, Script, ScriptCall};
-use super::scripts::Scripts;
+use super::scripts::{NewHash, Script, ScriptCall, Scripts};
 use crate::clock::{Clock, sleep};
 use crate::random::random;
 use crate::sync::{Mutex, lock};

@@ -2,7 +2,7 @@
 
 use super::super::session_store::StoreUnavailable;
 use super::address::{Kind, RedisAddress};
-use super::script::{ScriptCall, ScriptServer};
+use super::scripts::{ScriptCall, ScriptServer};
 use crate::clock::{self, sleep, timeout_at};
 use crate::sync::{Mutex, lock};
 use redis::aio::{ConnectionManager, ConnectionManagerConfig};

@@ -16,9 +16,8 @@
 mod address;
 mod calls;
 mod connection;
-mod script;
 mod scripts;
 
 pub use address::{RedisAddress, RedisAddressError};
 pub use calls::RedisStore;
-pub use script::{NewHash, ScriptServer};
+pub use scripts::{NewHash, ScriptServer};
