@@ -28,7 +28,6 @@
 //! assert_eq!(error, IngestError::UnreadFormat("text"));
 //! ```
 
-mod components;
 mod decode;
 mod error;
 mod jpeg;
