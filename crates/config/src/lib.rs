@@ -10,25 +10,21 @@
 mod access;
 mod base_path;
 mod flag_values;
-#[cfg(feature = "jwt")]
-mod jwt;
 mod limits;
 mod memory_bound;
 mod service;
 mod settings;
 mod store;
-#[cfg(feature = "tls")]
-mod tls;
 
 pub use access::AccessConfig;
+#[cfg(feature = "jwt")]
+pub use access::JwtConfig;
 pub use base_path::{BasePath, BasePathError};
 pub use flag_values::{parse_duration, parse_listen};
-#[cfg(feature = "jwt")]
-pub use jwt::JwtConfig;
 pub use limits::{LimitsConfig, OFF};
 pub use memory_bound::{MAX_BUFFER_BYTES, MemoryBound, PROBE_CONNECTIONS};
+#[cfg(feature = "tls")]
+pub use service::TlsConfig;
 pub use service::{BODY_BYTES_PER_SECOND, Config};
 pub use settings::{ConfigError, Secret};
 pub use store::StoreConfig;
-#[cfg(feature = "tls")]
-pub use tls::TlsConfig;

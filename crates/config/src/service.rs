@@ -7,11 +7,11 @@ use super::settings::{
     ConfigError, delay, in_range, moment, origins, permits, positive, settings, threads,
 };
 use super::store::StoreConfig;
-#[cfg(feature = "tls")]
-use super::tls::TlsConfig;
 use bagtrack_cli::ModelFiles;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
+#[cfg(feature = "tls")]
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// What a session with usual parameters is charged at most.
@@ -168,6 +168,18 @@ impl Config {
 
 fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
+}
+
+#[cfg(feature = "tls")]
+settings! {
+    /// The certificate that clients see. Without one the service speaks plain HTTP.
+    pub struct TlsConfig {
+        # "Listening"
+        /// Speak HTTPS: a PEM file with the certificate of this host, then those of its issuers. SIGHUP reads it again.
+        tls_cert: Option<PathBuf> = None;
+        /// A PEM file with the private key of that certificate, ECDSA, RSA or Ed25519, without a passphrase.
+        tls_key: Option<PathBuf> = None;
+    }
 }
 
 #[cfg(test)]
