@@ -1,4 +1,4 @@
-//! What names a request to its client: the path, as the client knows it, and the id.
+//! What names a request to its client: the path, as the client knows it, the id, and the idempotency key.
 //!
 //! The id is the client's `x-request-id` where it can be used, so that a trace can be followed through several
 //! services, else a new one.
@@ -9,8 +9,7 @@ use axum::extract::{FromRequestParts, Request};
 use axum::http::header::HeaderName;
 use axum::http::request::Parts;
 use axum::http::{Extensions, HeaderMap, HeaderValue, Uri};
-use bagtrack_api::ProblemDocument;
-use bagtrack_api::ProblemKind as Kind;
+use bagtrack_api::{ProblemDocument, ProblemKind as Kind};
 use bagtrack_sessions::random::new_id;
 use std::convert::Infallible;
 
@@ -90,4 +89,27 @@ pub fn set_request_id(headers: &mut HeaderMap) -> HeaderValue {
     let id = HeaderValue::try_from(id).expect("a UUID is visible ASCII");
     headers.insert(REQUEST_ID, id.clone());
     id
+}
+
+pub const IDEMPOTENCY_KEY: &str = "idempotency-key";
+const MAX_KEY_BYTES: usize = 255;
+
+/// The idempotency key of a request.
+///
+/// # Errors
+/// There is more than one, or it is empty, too long, or not visible ASCII.
+pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {
+    let mut values = headers.get_all(IDEMPOTENCY_KEY).iter();
+    let Some(value) = values.next() else {
+        return Ok(None);
+    };
+    let text = value.to_str().unwrap_or("");
+    let usable = (1..=MAX_KEY_BYTES).contains(&text.len())
+        && text.bytes().all(|byte| byte.is_ascii_graphic());
+    match usable && values.next().is_none() {
+        true => Ok(Some(text.to_owned())),
+        false => Err(Problem::malformed(
+            "`Idempotency-Key` must be given once, with 1 to 255 visible ASCII characters.",
+        )),
+    }
 }

@@ -19,7 +19,6 @@ pub mod admitted;
 pub mod answer_form;
 pub mod body;
 pub mod caller;
-pub mod idempotency_key;
 pub mod instance;
 mod json;
 mod misnamed;

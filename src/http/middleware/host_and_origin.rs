@@ -7,8 +7,7 @@
 use super::client_quotas::{RATE_LIMIT, RATE_LIMIT_POLICY};
 use super::response_headers::DRAINING;
 use super::trace_context::TRACEPARENT;
-use crate::http::extract::idempotency_key::IDEMPOTENCY_KEY;
-use crate::http::extract::instance::REQUEST_ID;
+use crate::http::extract::instance::{IDEMPOTENCY_KEY, REQUEST_ID};
 use crate::http::problems::problem::Problem;
 use crate::http::respond::annotated_image::ANSWER;
 use crate::http::respond::answer::{CHECKPOINT, REPLAYED};

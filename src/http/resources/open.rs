@@ -2,7 +2,7 @@
 
 use crate::http::extract::admitted::Upload;
 use crate::http::extract::caller::{Caller, client_of};
-use crate::http::extract::idempotency_key;
+use crate::http::extract::instance::idempotency_key;
 use crate::http::extract::overrides;
 use crate::http::extract::texts::Texts;
 use crate::http::problems::problem::Problem;
@@ -107,7 +107,7 @@ impl FromRequest<AppState> for CreateRequest {
         let (mut parts, body) = request.into_parts();
         let caller = Caller::from_request_parts(&mut parts, state).await?;
         caller.require_key()?;
-        let header = idempotency_key::key_of(&parts.headers)?;
+        let header = idempotency_key(&parts.headers)?;
         let key = match (id_of_path(&mut parts).await?, header) {
             (Some(_), Some(_)) => {
                 let detail = "The id in the path stands for the `Idempotency-Key`; leave that out.";
