@@ -12,9 +12,8 @@
 mod document;
 pub mod example_frames;
 mod key_order;
-mod param_limits;
 mod params_schema;
 mod problem_responses;
 
 pub use document::document;
-pub use param_limits::create_description;
+pub use params_schema::create_description;

@@ -1,7 +1,8 @@
-//! The schema of the tracker's parameters. It is made here and nowhere else, from the tracker's table.
+//! The schema of the tracker's parameters, made here and nowhere else, from the tracker's table; and what the document
+//! says of the limits on products of sizes: the words of the errors with which they are refused.
 
 use crate::requests::{MAX_EXACT, number_schema, public_params};
-use bagtrack_tracker::{Parameter, Params, Preset};
+use bagtrack_tracker::{Features, Parameter, Params, Preset};
 use serde_json::Value;
 use utoipa::Number;
 use utoipa::openapi::schema::{
@@ -52,4 +53,47 @@ fn param(row: &Parameter, default: Option<Value>) -> Schema {
         .description(Some(row.description.trim()))
         .default(default);
     schema.build().into()
+}
+
+/// The description of the call that opens a session.
+pub fn create_description() -> String {
+    let limits: Vec<String> = too_much()
+        .iter()
+        .filter_map(|params| params.validate().err())
+        .map(|error| format!("- `{}` must be {}.", error.name, error.expected))
+        .collect();
+    format!(
+        "The first frame and the target's box start the tracker. A session snapshot in the place of the frame, with \
+         nothing else, restores that session under a new id; it goes on exactly where it stood.\n\n\
+         Every parameter has a range. Sizes that multiply have limits together, which bound the time and memory of a \
+         session. The feature length is patch_width times patch_height, and {} times that with the preset `robust`.\n\n\
+         {}\n\n\
+         A parameter out of these answers `invalid-parameter`, with the limit in its detail.\n\n\
+         `curl --data-binary @first.jpg 'http://localhost:8080/sessions?box=10,20,30,40'`",
+        Features::Gradients.channels(),
+        limits.join("\n")
+    )
+}
+
+/// Parameters that are each in their range, and together beyond one limit: of candidates, of what is kept, of
+/// comparisons with the background.
+fn too_much() -> [Params; 3] {
+    let robust = || Preset::Robust.params();
+    let large = || Params {
+        patch_width: 64,
+        patch_height: 64,
+        ..robust()
+    };
+    [
+        large(),
+        Params {
+            particles: 1,
+            ..large()
+        },
+        Params {
+            particles: 1000,
+            background_samples: 256,
+            ..robust()
+        },
+    ]
 }
