@@ -4,11 +4,10 @@
 use super::error::IngestError;
 use super::jpeg::Jpeg;
 use super::limits::Limits;
-use super::orientation;
 use super::png_chunks::Png;
 use super::raster::{self, WebPFile};
 use super::sniff::{self, Format};
-use super::stored_image::Scratch;
+use super::stored_image::{Scratch, orientation_of, upright_size};
 use bagtrack_tracker::{Frame, FrameFormat};
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -63,7 +62,7 @@ impl Inspected<'_> {
     pub fn size(&self) -> (u32, u32) {
         match &self.file {
             File::Jpeg(jpeg) => jpeg.size(),
-            File::Png(png) => orientation::upright(png.size, orientation::of_exif(png.exif)),
+            File::Png(png) => upright_size(png.size, orientation_of(png.exif)),
             File::WebP(webp) => webp.size(),
         }
     }

@@ -3,9 +3,8 @@
 use super::error::IngestError;
 use super::jpeg_markers::Markers;
 use super::limits::{Limits, MAX_JPEG_SCANS};
-use super::orientation;
 use super::sniff::Format;
-use super::stored_image::{Channel, Scratch, StoredImage};
+use super::stored_image::{Channel, Scratch, StoredImage, orientation_of, upright_size};
 use bagtrack_tracker::FrameFormat;
 use bagtrack_tracker::ycbcr::{self, Order};
 use image::metadata::Orientation;
@@ -38,7 +37,7 @@ impl<'file> Jpeg<'file> {
         if markers.is_implausibly_small() {
             return Err(damaged("it holds less data than its size needs"));
         }
-        let orientation = orientation::of_exif(markers.exif(bytes));
+        let orientation = orientation_of(markers.exif(bytes));
         Ok(Self {
             bytes,
             markers,
@@ -49,7 +48,7 @@ impl<'file> Jpeg<'file> {
     /// Width and height as it is shown.
     pub(super) fn size(&self) -> (u32, u32) {
         let stored = (self.markers.width, self.markers.height);
-        orientation::upright(stored, self.orientation)
+        upright_size(stored, self.orientation)
     }
 
     /// Its luma and chroma: at full size or reduced.
@@ -63,7 +62,7 @@ impl<'file> Jpeg<'file> {
         let source = (markers.width, markers.height);
         // Before it is turned upright, as the decoder sees it.
         let format = FrameFormat {
-            size: orientation::upright(format.size, orientation),
+            size: upright_size(format.size, orientation),
             has_color: format.has_color && markers.has_usual_chroma(),
         };
         #[cfg(feature = "turbo")]

@@ -34,7 +34,6 @@ mod jpeg;
 mod jpeg_markers;
 mod limits;
 mod luma;
-mod orientation;
 mod png_chunks;
 mod prefix_codes;
 mod raster;

@@ -3,10 +3,9 @@
 use super::error::IngestError;
 use super::limits::Limits;
 use super::luma::{chroma_of, luma_of};
-use super::orientation;
 use super::png_chunks::Png;
 use super::sniff::Format;
-use super::stored_image::{Channel, StoredImage};
+use super::stored_image::{Channel, StoredImage, orientation_of, upright_size};
 use super::webp_chunks::WebP;
 use bagtrack_tracker::{FrameFormat, ycbcr};
 use image::codecs::png::PngDecoder;
@@ -45,7 +44,7 @@ pub(super) fn decode_png(
         return Err(Format::Png.damaged("its headers contradict each other"));
     }
     limits.check_memory(memory(&decoder) + copied)?;
-    let orientation = orientation::of_exif(png.exif);
+    let orientation = orientation_of(png.exif);
     decode(decoder, Format::Png, orientation, format)
 }
 
@@ -78,7 +77,7 @@ impl<'file> WebPFile<'file> {
 
     /// Width and height as it is shown.
     pub(super) fn size(&self) -> (u32, u32) {
-        orientation::upright(self.decoder.dimensions(), self.orientation)
+        upright_size(self.decoder.dimensions(), self.orientation)
     }
 
     /// Its luma and chroma.

@@ -1,9 +1,11 @@
 //! An image as a file stores it, and the frame that it becomes, in memory that a thread keeps from one frame to the
 //! next.
+//!
+//! Phones store the rows of the sensor, and a note how the image is to be turned: the EXIF orientation.
 
-use super::orientation;
 use bagtrack_tracker::{Frame, FrameError, FrameFormat, area_average, ycbcr};
 use image::metadata::Orientation;
+use image::{DynamicImage, GrayImage};
 use std::borrow::Cow;
 
 /// Bytes of a buffer that a thread keeps: enough for the luma of a frame of 4096 x 4096.
@@ -62,11 +64,11 @@ impl StoredImage<'_> {
         format: FrameFormat,
         [luma, cb, cr]: Planes,
     ) -> Result<Frame, FrameError> {
-        let source = orientation::upright(self.source, self.orientation);
+        let source = upright_size(self.source, self.orientation);
         let upright = |channel: Channel<'_>, size, memory| {
             channel.upright(self.orientation).resized(size, memory)
         };
-        let of_luma = orientation::upright(self.luma.size, self.orientation);
+        let of_luma = upright_size(self.luma.size, self.orientation);
         // Frames of another size than the session's are decoded too, and refused there.
         let size = (format.size.0.min(of_luma.0), format.size.1.min(of_luma.1));
         let half = ycbcr::chroma_size(size);
@@ -82,7 +84,7 @@ impl Channel<'_> {
     fn upright(mut self, orientation: Orientation) -> Self {
         if orientation != Orientation::NoTransforms {
             let values = self.values.into_owned();
-            self.values = Cow::Owned(orientation::apply(values, &mut self.size, orientation));
+            self.values = Cow::Owned(turned_upright(values, &mut self.size, orientation));
         }
         self
     }
@@ -111,4 +113,38 @@ impl Channel<'_> {
         area_average(&repeated, longer, size, &mut memory);
         memory
     }
+}
+
+/// The orientation that an EXIF block (from its TIFF header on) notes; upright where it says nothing readable.
+pub(super) fn orientation_of(exif: Option<&[u8]>) -> Orientation {
+    exif.and_then(Orientation::from_exif_chunk)
+        .unwrap_or(Orientation::NoTransforms)
+}
+
+/// Whether width and height change places.
+fn swaps_sides(orientation: Orientation) -> bool {
+    matches!(
+        orientation,
+        Orientation::Rotate90
+            | Orientation::Rotate270
+            | Orientation::Rotate90FlipH
+            | Orientation::Rotate270FlipH
+    )
+}
+
+/// Width and height once the image is turned.
+pub(super) fn upright_size((width, height): (u32, u32), orientation: Orientation) -> (u32, u32) {
+    match swaps_sides(orientation) {
+        true => (height, width),
+        false => (width, height),
+    }
+}
+
+/// Turns and mirrors the image of this `size` upright. `size` becomes that of the upright image.
+fn turned_upright(luma: Vec<u8>, size: &mut (u32, u32), orientation: Orientation) -> Vec<u8> {
+    let stored = GrayImage::from_raw(size.0, size.1, luma).expect("a decoder gives every pixel");
+    let mut image = DynamicImage::ImageLuma8(stored);
+    image.apply_orientation(orientation);
+    *size = (image.width(), image.height());
+    image.into_luma8().into_raw()
 }
