@@ -27,5 +27,4 @@ pub mod overrides;
 pub mod query;
 pub mod texts;
 pub mod video_frames;
-pub mod video_place;
 pub mod video_range;

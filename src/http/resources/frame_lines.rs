@@ -5,8 +5,7 @@
 //! its frames.
 
 use super::frames::FramesRequest;
-use crate::http::extract::video_frames::VideoFrames;
-use crate::http::extract::video_place::{VideoPlace, count_frame};
+use crate::http::extract::video_frames::{VideoFrames, VideoPlace, count_frame};
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::stream_answer;
 use crate::http::respond::ndjson::{self, FrameSequence};

@@ -1,6 +1,6 @@
 //! `POST /track` with a video and a box: an answer for each frame, the first one being the box. Nothing is kept.
 
-use crate::http::extract::video_place::count_frame;
+use crate::http::extract::video_frames::count_frame;
 use crate::http::extract::video_range::{RangeFrame, RangeFrames};
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::answer;

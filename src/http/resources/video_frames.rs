@@ -1,8 +1,7 @@
 //! `POST /frames`: the frames of a video as pictures, for who cannot decode it.
 
 use crate::http::extract::admitted::StatelessRequest;
-use crate::http::extract::video_frames::VideoFrames;
-use crate::http::extract::video_place::{VideoPlace, count_frame};
+use crate::http::extract::video_frames::{VideoFrames, VideoPlace, count_frame};
 use crate::http::problems::problem::Problem;
 use crate::http::respond::video_answer;
 use crate::http::state::AppState;
