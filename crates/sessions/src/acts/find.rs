@@ -6,8 +6,8 @@ use crate::planted::PlantedFault;
 use crate::store::{Record, Step, StoreUnavailable};
 use crate::{
     Flow, LockedSession, NewSession, NoSession, Owner, Session, SessionState, SnapshotError,
+    WorkMeter,
 };
-use bagtrack_tracker::Expert;
 use std::sync::Arc;
 use std::time::Duration;
 use uuid::Uuid;
@@ -15,30 +15,6 @@ use uuid::Uuid;
 /// How long the store tells at most that a session was ended: much longer than any request takes. Later it tells that
 /// there is none. Nobody's quota counts these marks.
 const TOMBSTONE: Duration = Duration::from_secs(600);
-
-/// What the states of records are read with.
-struct StateReader {
-    max_recent: usize,
-    expert: Option<Arc<dyn Expert>>,
-}
-
-impl StateReader {
-    /// The state of a record, read beside that of the same session at another frame.
-    fn read(
-        &self,
-        record: &Record,
-        known: Option<&SessionState>,
-    ) -> Result<SessionState, ActError> {
-        let expert = self.expert.as_ref();
-        let state = SessionState::from_stored(&record.state, self.max_recent, expert, known);
-        let state = state.map_err(ActError::StoredState)?;
-        // From another frame on, the record's numbers would not be the session's.
-        match state.latest_frame() == record.version.checkpoint {
-            true => Ok(state),
-            false => Err(ActError::StoredState(SnapshotError::Damaged)),
-        }
-    }
-}
 
 impl SessionService {
     /// The live session of this id and owner, from memory or from the store.
@@ -95,11 +71,12 @@ impl SessionService {
 
     /// The session of a record, which is then in memory.
     async fn insert(&self, id: Uuid, record: Record, flow: Flow) -> Result<Arc<Session>, ActError> {
-        let reading = self.reading(flow, move |reader| {
-            let state = reader.read(&record, None)?;
-            Ok((state, record))
-        });
-        let (state, record) = reading.await?;
+        let (service, queue) = (self.clone(), self.admission.enter(flow, Box::new(()))?);
+        let read = move |_: &mut WorkMeter| {
+            let state = service.read_state(&record, None)?;
+            Ok::<_, ActError>((state, record))
+        };
+        let (state, record) = self.run(queue, read).await?;
         if let Some(session) = self.registry.live(id)
             && session.name().incarnation != record.opening.incarnation
         {
@@ -124,18 +101,20 @@ impl SessionService {
         }
     }
 
-    /// Runs `work` on a worker, with what reads the states of records.
-    async fn reading<T, F>(&self, flow: Flow, work: F) -> Result<T, ActError>
-    where
-        T: Send + 'static,
-        F: FnOnce(&StateReader) -> Result<T, ActError> + Send + 'static,
-    {
-        let queue = self.admission.enter(flow, Box::new(()))?;
-        let reader = StateReader {
-            max_recent: self.settings.max_answers,
-            expert: self.expert.clone(),
-        };
-        self.run(queue, move |_| work(&reader)).await
+    /// The state of a record, read beside that of the same session at another frame. It takes a worker's time.
+    fn read_state(
+        &self,
+        record: &Record,
+        known: Option<&SessionState>,
+    ) -> Result<SessionState, ActError> {
+        let (max_recent, expert) = (self.settings.max_answers, self.expert.as_ref());
+        let state = SessionState::from_stored(&record.state, max_recent, expert, known);
+        let state = state.map_err(ActError::StoredState)?;
+        // From another frame on, the record's numbers would not be the session's.
+        match state.latest_frame() == record.version.checkpoint {
+            true => Ok(state),
+            false => Err(ActError::StoredState(SnapshotError::Damaged)),
+        }
     }
 
     /// Goes on from a record of the store, which is of this session.
@@ -145,8 +124,9 @@ impl SessionService {
         record: Record,
         flow: Flow,
     ) -> Result<LockedSession, ActError> {
-        self.reading(flow, move |reader| {
-            let newest = reader.read(&record, Some(locked.state()))?;
+        let (service, queue) = (self.clone(), self.admission.enter(flow, Box::new(()))?);
+        self.run(queue, move |_| {
+            let newest = service.read_state(&record, Some(locked.state()))?;
             match PlantedFault::GoesOnWithOldState.is_here() {
                 true => locked.session().set_version(Some(record.version)),
                 false => locked.replace(newest, Some(record.version)),
