@@ -1,6 +1,6 @@
 //! `bagtrack sample`.
 
-use bagtrack_cli::{output, progress};
+use bagtrack_cli::output;
 use bagtrack_sample::{Attributes, Clip, Format, Scene, Settings};
 use std::path::PathBuf;
 
@@ -118,7 +118,7 @@ pub fn run(args: Args) -> Result<(), Box<dyn std::error::Error>> {
         attributes: args.attributes.into(),
     })?;
     output::new_folder(&args.out)?;
-    let bar = progress::bar(u64::from(args.frames), "drawing");
+    let bar = output::bar(u64::from(args.frames), "drawing");
     clip.write(&args.out, format, || bar.inc(1))?;
     bar.finish_and_clear();
     let first = clip.target(0);

@@ -1,6 +1,6 @@
 //! The annotated boxes of a sequence in the OTB layout.
 
-use super::sequence_error::SequenceError;
+use super::frames::SequenceError;
 use bagtrack_tracker::Rect;
 use std::fs;
 use std::path::Path;

@@ -1,6 +1,5 @@
-//! The frames of a folder, in order.
+//! The frames of a folder, in order, and why a folder is refused.
 
-use super::sequence_error::SequenceError;
 use std::cmp::Ordering;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -95,6 +94,24 @@ fn number<'a>(text: &mut &'a str) -> &'a str {
     let (digits, rest) = text.split_at(end);
     *text = rest;
     digits.trim_start_matches('0')
+}
+
+/// A sequence cannot be used; the text is one line and names the folder.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}: {reason}", dir.display())]
+pub struct SequenceError {
+    dir: PathBuf,
+    reason: String,
+}
+
+impl SequenceError {
+    /// A reason for the folder `dir`.
+    pub fn new(dir: &Path, reason: impl Into<String>) -> Self {
+        Self {
+            dir: dir.to_owned(),
+            reason: reason.into(),
+        }
+    }
 }
 
 #[cfg(test)]

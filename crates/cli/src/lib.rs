@@ -11,11 +11,9 @@ pub mod frames;
 mod model;
 pub mod output;
 mod params;
-pub mod progress;
-mod sequence_error;
 
 pub use assignment::{AssignError, Assignment, assign, parse_assignment};
 pub use boxes::{BOXES, parse_boxes, read_boxes};
+pub use frames::SequenceError;
 pub use model::{ModelFiles, ModelFlag};
 pub use params::ParamFlags;
-pub use sequence_error::SequenceError;

@@ -2,7 +2,7 @@
 //!
 //! Exit status: 0, or 1 after an error that is printed as one line on standard error, or 2 from clap on wrong usage.
 
-use bagtrack_cli::{ModelFlag, ParamFlags, frames, output, progress, read_boxes};
+use bagtrack_cli::{ModelFlag, ParamFlags, frames, output, read_boxes};
 use bagtrack_eval::{
     Comparison, Playback, Report, Sequence, SequenceRuns, Variant, ablation, results,
 };
@@ -161,7 +161,7 @@ fn evaluate(
         params.push(set.map_err(|error| format!("{}: {error}", variant.label))?);
     }
     let mut evaluated: Vec<Vec<SequenceRuns>> = vec![Vec::new(); variants.len()];
-    let bar = progress::bar((dirs.len() * variants.len()) as u64, "sequences");
+    let bar = output::bar((dirs.len() * variants.len()) as u64, "sequences");
     for dir in dirs {
         let sequence = Sequence::load_played(dir, args.playback(), &Limits::default())?;
         let mut done: Vec<SequenceRuns> = Vec::new();

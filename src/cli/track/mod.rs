@@ -18,7 +18,7 @@ mod video_file;
 mod video_info;
 
 use bagtrack_api::requests::Name;
-use bagtrack_cli::{BOXES, ModelFlag, ParamFlags, progress, read_boxes};
+use bagtrack_cli::{BOXES, ModelFlag, ParamFlags, output, read_boxes};
 use bagtrack_formats::{Columns, FileFormat, Format, Unfit};
 use bagtrack_sessions::{MAX_TARGETS, Selection};
 use bagtrack_tracker::Rect;
@@ -115,7 +115,7 @@ pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
     let bar = match rows.are_on_terminal() {
         // The rows tell how far it is, and a bar would be among them.
         true => indicatif::ProgressBar::hidden(),
-        false => progress::bar_or_count(left(&frames, args.frames), "frames"),
+        false => output::bar_or_count(left(&frames, args.frames), "frames"),
     };
     let job = Job {
         selection: Selection::new(boxes.len(), args.until_lost, args.keyframes),
