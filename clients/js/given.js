@@ -5,11 +5,55 @@ import { Problem } from "./problem.js";
 /** @param {string} detail */
 export const unsupported = (detail) => new Problem({ type: "unsupported-image", status: 415, detail });
 
+/** The name of a value's class, also of one of another realm, such as a frame's or a test runner's.
+ * @param {unknown} value */
+export const className = (value) => Object.prototype.toString.call(value).slice("[object ".length, -1);
+
+const ELEMENTS = ["HTMLCanvasElement", "HTMLVideoElement", "HTMLImageElement"];
+const DRAWN = ["ImageBitmap", "VideoFrame", "OffscreenCanvas", ...ELEMENTS];
+const PIXELS = ["Uint8Array", "Uint8ClampedArray"];
+const FILES = ["Blob", "File"];
+/** Of a video whose picture is there: `HAVE_CURRENT_DATA`. */
+const SHOWS = 2;
+
 /** Refuses what is no image for a tracker here.
- * @param {unknown} image */
+ * @param {any} image */
 export function checkImage(image) {
-  if (typeof image === "object" && image !== null) return;
-  throw unsupported("An image is { width, height, data }, planes, a picture, a video or a Blob.");
+  const name = className(image);
+  if (FILES.includes(name)) return;
+  if (DRAWN.includes(name)) return void sizeOf(image);
+  const isPixels = typeof image === "object" && image !== null && ("luma" in image || "data" in image);
+  if (!isPixels)
+    throw unsupported(`An image is { width, height, data }, planes, a picture, a video or a Blob.${hint(image)}`);
+  const { luma, cb, cr, data } = image;
+  const parts = "luma" in image ? [luma, cb ?? luma, cr ?? luma] : [data];
+  if (parts.every((part) => PIXELS.includes(className(part)))) return;
+  throw unsupported("Pixels are bytes: each of data, luma, cb and cr is a Uint8Array or a Uint8ClampedArray.");
+}
+
+/** What to do with what is no image yet.
+ * @param {unknown} image */
+function hint(image) {
+  if (className(image) === "Promise") return " This is a promise: await it.";
+  if (!ArrayBuffer.isView(image) && className(image) !== "ArrayBuffer") return "";
+  return " A browser takes the bytes of a file as new Blob([bytes]); elsewhere decode them.";
+}
+
+/** The size in which an image is drawn; or a refusal, since in place of nothing a black frame would be tracked.
+ * @param {import("./image.js").Drawable} image */
+export function sizeOf(image) {
+  const [width, height] = sidesOf(image);
+  const isShown = !("readyState" in image) || image.readyState >= SHOWS;
+  if (width > 0 && height > 0 && isShown) return [width, height];
+  throw unsupported("The picture has no pixels: it is closed, empty, or a video or <img> that has not loaded.");
+}
+
+/** @param {import("./image.js").Drawable} image */
+function sidesOf(image) {
+  if ("displayWidth" in image) return [image.displayWidth, image.displayHeight];
+  if ("videoWidth" in image) return [image.videoWidth, image.videoHeight];
+  if ("naturalWidth" in image) return [image.naturalWidth, image.naturalHeight];
+  return [image.width, image.height];
 }
 
 /** The frame itself, whose buffer its owner may fill with another one afterwards; or a refusal. What a WebSocket would
@@ -18,10 +62,9 @@ export function checkImage(image) {
  * @returns {Blob | Uint8Array<ArrayBuffer>} */
 export function frameOf(frame) {
   if (ArrayBuffer.isView(frame)) return new Uint8Array(frame.buffer, frame.byteOffset, frame.byteLength).slice();
-  // By their names: those of another realm, such as a frame's or a test runner's, are of other classes.
-  const name = Object.prototype.toString.call(frame);
-  if (/^\[object (Blob|File)\]$/.test(name)) return /** @type {Blob} */ (frame);
-  if (name === "[object ArrayBuffer]") return new Uint8Array(/** @type {ArrayBuffer} */ (frame)).slice();
+  const name = className(frame);
+  if (FILES.includes(name)) return /** @type {Blob} */ (frame);
+  if (name === "ArrayBuffer") return new Uint8Array(/** @type {ArrayBuffer} */ (frame)).slice();
   throw unsupported("A frame is a Blob, an ArrayBuffer or a Uint8Array with a JPEG, PNG or WebP file.");
 }
 

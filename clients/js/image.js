@@ -1,6 +1,6 @@
 // What a frame is given as, and its pixels.
 
-import { checkImage, unsupported } from "./given.js";
+import { checkImage, sizeOf, unsupported } from "./given.js";
 import { Problem } from "./problem.js";
 
 /**
@@ -17,7 +17,8 @@ import { Problem } from "./problem.js";
  * @property {Uint8Array} [cb]
  * @property {Uint8Array} [cr]
  *
- * @typedef {ImageBitmap | VideoFrame | HTMLCanvasElement | OffscreenCanvas | HTMLVideoElement} Drawable
+ * @typedef {ImageBitmap | VideoFrame | HTMLCanvasElement | OffscreenCanvas | HTMLVideoElement | HTMLImageElement}
+ *   Drawable
  *
  * @typedef {Pixels | Planes | Drawable | Blob} Image Outside of browsers pixels or planes; a `Blob` is a file that the
  *   browser can decode.
@@ -53,11 +54,4 @@ function draw(image) {
   if (!context) throw new Error("The browser cannot draw the frame.");
   context.drawImage(image, 0, 0, width, height);
   return context.getImageData(0, 0, width, height);
-}
-
-/** @param {Drawable} image */
-function sizeOf(image) {
-  if ("displayWidth" in image) return [image.displayWidth, image.displayHeight];
-  if ("videoWidth" in image) return [image.videoWidth, image.videoHeight];
-  return [image.width, image.height];
 }

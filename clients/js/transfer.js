@@ -1,8 +1,11 @@
 // Frames on their way to the worker.
 
-import { checkImage } from "./given.js";
+import { checkImage, className } from "./given.js";
 
 /** @typedef {import("./image.js").Image} Image */
+
+/** What no worker can be sent, unless as a bitmap. */
+const DRAWN = ["HTMLCanvasElement", "OffscreenCanvas", "HTMLVideoElement", "HTMLImageElement"];
 
 /** The same frame, as it can be sent to a worker, and what is handed over to it.
  * @param {Image} image
@@ -13,24 +16,29 @@ export async function sendable(image) {
     const sent = image.clone();
     return { sent, handed: [sent] };
   }
-  const isDrawn = ["HTMLCanvasElement", "OffscreenCanvas", "HTMLVideoElement"].includes(image.constructor?.name);
-  if (!isDrawn) return withoutTheRest(image);
+  if ("luma" in image || "data" in image) return plain(image);
+  if (!DRAWN.includes(className(image))) return { sent: image, handed: [] };
   const sent = await createImageBitmap(/** @type {ImageBitmapSource} */ (image));
   return { sent, handed: [sent] };
 }
 
-/** The image, with copies of what are parts of larger buffers: a message has the whole buffer of each array.
- * @param {any} image
+/** Pixels or planes alone: what an `ImageData` tells by accessors would not be sent with it. Those that are parts of
+ * larger buffers are copied: a message has the whole buffer of each array.
+ * @param {import("./image.js").Pixels | import("./image.js").Planes} image
  * @returns {{sent: Image, handed: Transferable[]}} */
-function withoutTheRest(image) {
-  // Shared memory is not copied at all.
-  const isPart = (/** @type {any} */ { BYTES_PER_ELEMENT: bytes, byteLength, buffer } = {}) =>
-    bytes === 1 && buffer instanceof ArrayBuffer && byteLength < buffer.byteLength;
-  const parts = ["data", "luma", "cb", "cr"].filter((name) => isPart(image[name] ?? undefined));
-  if (parts.length === 0) return { sent: image, handed: [] };
-  const copies = parts.map((name) => new Uint8Array(image[name]));
-  const sent = { ...image, ...Object.fromEntries(parts.map((name, at) => [name, copies[at]])) };
-  return { sent, handed: copies.map(({ buffer }) => buffer) };
+function plain(image) {
+  const { width, height } = image;
+  /** @type {Transferable[]} */
+  const handed = [];
+  const own = (/** @type {any} */ pixels) => {
+    // Shared memory is not copied at all.
+    if (!(pixels?.buffer instanceof ArrayBuffer) || pixels.byteLength === pixels.buffer.byteLength) return pixels;
+    const copy = new Uint8Array(pixels);
+    handed.push(copy.buffer);
+    return copy;
+  };
+  if (!("luma" in image)) return { sent: { width, height, data: own(image.data) }, handed };
+  return { sent: { width, height, luma: own(image.luma), cb: own(image.cb), cr: own(image.cr) }, handed };
 }
 
 /** Gives up what was handed over.

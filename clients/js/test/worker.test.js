@@ -51,8 +51,10 @@ test("a call that cannot be sent fails alone", async () => {
   const client = new LocalClient();
   const session = await client.open(image, box, options);
   // Of a canvas a bitmap is made, which fails here as for one without pixels.
-  class HTMLCanvasElement {}
-  const wrong = /** @type {any[]} */ ([new HTMLCanvasElement(), { ...image, draw: () => undefined }]);
+  const canvas = { width, height, [Symbol.toStringTag]: "HTMLCanvasElement" };
+  const gone = luma.slice();
+  structuredClone(gone, { transfer: [gone.buffer] });
+  const wrong = /** @type {any[]} */ ([canvas, { ...image, luma: gone }]);
   const order = [image, wrong[0], image, wrong[1], wrong[0], image];
   const settled = await Promise.allSettled(order.map((each) => session.track(each)));
   assert.deepEqual(settled.map((each) => (each.status === "fulfilled" ? each.value.frame : each.reason.name)), [
@@ -64,6 +66,62 @@ test("a call that cannot be sent fails alone", async () => {
     3,
   ]);
   assert.equal(client.waiting.size, 0, "or the process does not end");
+  await client.close();
+});
+
+test("what is no image yet is told what to do with it", async () => {
+  const client = new LocalClient();
+  const session = await client.open(image, box, options);
+  const bytes = Buffer.from("a file");
+  const video = { videoWidth: 0, videoHeight: 0, readyState: 0, [Symbol.toStringTag]: "HTMLVideoElement" };
+  const cases = /** @type {[any, RegExp][]} */ ([
+    [bytes, /decode them/],
+    [new Uint8Array(bytes).buffer, /decode them/],
+    [Promise.resolve(image), /await it/],
+    [{}, /An image is/],
+    [{ width, height, data: [1, 2, 3] }, /^Pixels are bytes/],
+    [{ width, height, data: new Float32Array(4 * luma.length) }, /^Pixels are bytes/],
+    [{ width, height, data: luma.buffer }, /^Pixels are bytes/],
+    [{ width, height, luma: null }, /^Pixels are bytes/],
+    [{ ...image, cb: [1], cr: [1] }, /^Pixels are bytes/],
+    [video, /no pixels/],
+    // The size is known before the picture is there, and nothing would be drawn.
+    [{ ...video, videoWidth: width, videoHeight: height, readyState: 1 }, /no pixels/],
+    [{ width: 0, height: 0, [Symbol.toStringTag]: "ImageBitmap" }, /no pixels/],
+    [{ naturalWidth: 0, naturalHeight: 0, width, height, [Symbol.toStringTag]: "HTMLImageElement" }, /no pixels/],
+  ]);
+  for (const [given, words] of cases) {
+    const told = (/** @type {any} */ error) => slug("unsupported-image")(error) && words.test(error.message);
+    await assert.rejects(session.track(given), told, String(words));
+    await assert.rejects(Tracker.create(given, box), told, String(words));
+  }
+  assert.equal((await session.track({ ...image, cb: undefined, cr: undefined })).frame, 1);
+  await client.close();
+});
+
+test("an image may tell its sides and pixels by accessors, as `ImageData` does", async () => {
+  const large = new Uint8ClampedArray(4 * luma.length + 100).fill(255);
+  luma.forEach((gray, at) => large.fill(gray, 4 * at + 64, 4 * at + 67));
+  class Data {
+    constructor(/** @type {Uint8ClampedArray} */ pixels) {
+      this.draw = () => pixels;
+    }
+    get width() {
+      return width;
+    }
+    get height() {
+      return height;
+    }
+    get data() {
+      return this.draw();
+    }
+  }
+  const part = large.subarray(64, 64 + 4 * luma.length);
+  const client = new LocalClient();
+  const session = await client.open(new Data(part), box, options);
+  const gray = await client.open(image, box, options);
+  const box1 = (await session.track(new Data(part.slice()))).box;
+  assert.deepEqual(box1, (await gray.track(image)).box);
   await client.close();
 });
 

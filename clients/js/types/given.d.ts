@@ -1,9 +1,15 @@
 import { Problem } from "./problem.js";
 /** @param {string} detail */
 export declare const unsupported: (detail: string) => Problem;
+/** The name of a value's class, also of one of another realm, such as a frame's or a test runner's.
+ * @param {unknown} value */
+export declare const className: (value: unknown) => string;
 /** Refuses what is no image for a tracker here.
- * @param {unknown} image */
-export declare function checkImage(image: unknown): void;
+ * @param {any} image */
+export declare function checkImage(image: any): undefined;
+/** The size in which an image is drawn; or a refusal, since in place of nothing a black frame would be tracked.
+ * @param {import("./image.js").Drawable} image */
+export declare function sizeOf(image: import("./image.js").Drawable): number[];
 /** The frame itself, whose buffer its owner may fill with another one afterwards; or a refusal. What a WebSocket would
  * send as a text or not at all is none, and shared memory is sent by no browser.
  * @param {import("./client.js").Frame} frame

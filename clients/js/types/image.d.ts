@@ -10,7 +10,7 @@ export type Planes = {
     cb?: Uint8Array;
     cr?: Uint8Array;
 };
-export type Drawable = ImageBitmap | VideoFrame | HTMLCanvasElement | OffscreenCanvas | HTMLVideoElement;
+export type Drawable = ImageBitmap | VideoFrame | HTMLCanvasElement | OffscreenCanvas | HTMLVideoElement | HTMLImageElement;
 export type Image = Pixels | Planes | Drawable | Blob;
 /** The pixels of an image.
  * @param {Image} image

@@ -1,5 +1,4 @@
 export type Image = import("./image.js").Image;
-/** @typedef {import("./image.js").Image} Image */
 /** The same frame, as it can be sent to a worker, and what is handed over to it.
  * @param {Image} image
  * @returns {Promise<{sent: Image, handed: Transferable[]}>} */
