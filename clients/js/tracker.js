@@ -96,14 +96,17 @@ function answerOf(estimate) {
 /** Runs with a frame, which is made for it unless it is one.
  * @template T
  * @param {Image | Frame} image
- * @param {(frame: Frame) => T} run */
-async function withFrame(image, run) {
-  if (image instanceof Frame) return refusing(() => run(image));
-  const frame = await frameFor(image);
+ * @param {(frame: Frame) => T} run
+ * @param {Promise<unknown>} [before] What must have ended: of two files the first may be decoded last. */
+async function withFrame(image, run, before) {
+  const isGiven = image instanceof Frame;
+  const making = isGiven ? Promise.resolve(image) : frameFor(image);
+  const [made] = await Promise.allSettled([making, before]);
+  if (made.status === "rejected") throw made.reason;
   try {
-    return refusing(() => run(frame));
+    return refusing(() => run(made.value));
   } finally {
-    frame.free();
+    if (!isGiven) made.value.free();
   }
 }
 
@@ -125,6 +128,8 @@ export class Tracker {
     this.own = wasm;
     /** The last answer. */
     this.answer = answerOf(wasm.estimate);
+    /** @type {Promise<unknown>} The calls before. */
+    this.before = Promise.resolve();
   }
 
   /**
@@ -142,6 +147,16 @@ export class Tracker {
     throw new Problem({ type: "session-not-found", status: 404, detail: "The tracker is freed." });
   }
 
+  /** Runs with the next frame, after the calls before it.
+   * @template T
+   * @param {Image | Frame} image
+   * @param {(frame: Frame) => T} run */
+  next(image, run) {
+    const made = withFrame(image, run, this.before);
+    this.before = made.catch(() => undefined);
+    return made;
+  }
+
   /** A tracker that goes on from a snapshot: of `save`, or of the service.
    * @param {Uint8Array} snapshot */
   static async load(snapshot) {
@@ -156,14 +171,14 @@ export class Tracker {
   }
 
   /**
-   * Finds the target in the next frame.
+   * Finds the target in the next frame. Frames are taken in the order of the calls.
    * @param {Image | Frame} image
    * @param {object} [options]
    * @param {boolean} [options.see] Whether the answer shall tell what the tracker saw.
    * @returns {Promise<StreamAnswer>}
    */
   step(image, { see = false } = {}) {
-    return withFrame(image, (frame) => {
+    return this.next(image, (frame) => {
       if (!see) return (this.answer = answerOf(this.wasm.step(frame)));
       const seen = this.wasm.see(frame);
       const { particles: flat, votes } = seen;
@@ -178,7 +193,7 @@ export class Tracker {
    * @param {Image | Frame} image
    * @param {Box} box */
   correct(image, box) {
-    return withFrame(image, (frame) => (this.answer = answerOf(this.wasm.correct(frame, numbers(box)))));
+    return this.next(image, (frame) => (this.answer = answerOf(this.wasm.correct(frame, numbers(box)))));
   }
 
   /** The number of the last frame; that of the first is 0. */

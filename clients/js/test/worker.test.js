@@ -229,6 +229,40 @@ test("a box that is none, a side that is none, and a tracker that was freed are 
   assert.deepEqual(tracker.box, box);
 });
 
+test("a tracker takes frames in the order of the calls, also where the first is read last", async (context) => {
+  const bitmap = /** @type {any} */ (globalThis);
+  // In place of a browser: the first file is decoded last.
+  let first = true;
+  bitmap.OffscreenCanvas = class {
+    getContext() {
+      return {
+        drawImage: (/** @type {any} */ { gray }) => (this.gray = gray),
+        getImageData: () => ({ width, height, data: new Uint8ClampedArray(4 * luma.length).fill(this.gray) }),
+      };
+    }
+  };
+  bitmap.createImageBitmap = async (/** @type {Blob} */ blob) => {
+    if (first) await new Promise((resolve) => setTimeout(resolve, 50));
+    first = false;
+    return { width, height, gray: Number(await blob.text()), close: () => undefined };
+  };
+  context.after(() => {
+    delete bitmap.OffscreenCanvas;
+    delete bitmap.createImageBitmap;
+  });
+  const [tracker, other] = [await Tracker.create(image, box, options), await Tracker.create(image, box, options)];
+  const late = tracker.step(new Blob(["200"]));
+  const refused = assert.rejects(tracker.step(/** @type {any} */ ("no image")), slug("unsupported-image"));
+  const next = tracker.step(image);
+  assert.deepEqual([(await late).frame, (await next).frame], [1, 2]);
+  await refused;
+  const data = new Uint8ClampedArray(4 * luma.length).fill(200);
+  await other.step({ width, height, data });
+  assert.deepEqual((await other.step(image)).box, (await next).box);
+  tracker.free();
+  other.free();
+});
+
 test("a stream here takes no frame after `close`", async () => {
   const client = new LocalClient();
   const session = await client.open(image, box, options);

@@ -23,6 +23,8 @@ export declare class Tracker {
     own: Wasm | undefined;
     /** The last answer. */
     answer: import("./session.js").Answer;
+    /** @type {Promise<unknown>} The calls before. */
+    before: Promise<unknown>;
     /** @param {Wasm} wasm */
     constructor(wasm: Wasm);
     /**
@@ -33,13 +35,18 @@ export declare class Tracker {
      */
     static create(image: Image | Frame, box: Box, options?: TrackerOptions): Promise<Tracker>;
     get wasm(): Wasm;
+    /** Runs with the next frame, after the calls before it.
+     * @template T
+     * @param {Image | Frame} image
+     * @param {(frame: Frame) => T} run */
+    next<T>(image: Image | Frame, run: (frame: Frame) => T): Promise<T>;
     /** A tracker that goes on from a snapshot: of `save`, or of the service.
      * @param {Uint8Array} snapshot */
     static load(snapshot: Uint8Array): Promise<Tracker>;
     /** The whole state as bytes: for `load`, and for a service that takes unsigned snapshots. */
     save(): Uint8Array<ArrayBuffer>;
     /**
-     * Finds the target in the next frame.
+     * Finds the target in the next frame. Frames are taken in the order of the calls.
      * @param {Image | Frame} image
      * @param {object} [options]
      * @param {boolean} [options.see] Whether the answer shall tell what the tracker saw.
