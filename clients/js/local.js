@@ -17,6 +17,13 @@ import { close, sendable } from "./transfer.js";
 /** Of all clients, and beyond the end of a thread: a session must not be taken for one of another thread. */
 let lastId = 0;
 
+const ENDED = { type: "session-not-found", status: 404, detail: "The session has ended." };
+
+/** Whether a call is of sessions that were opened before.
+ * @param {string} name
+ * @param {{ids?: number[]}} call */
+const isOfSessions = (name, { ids }) => name !== "open" && name !== "restore" && ids?.length !== 0;
+
 /** A thread with trackers. Sessions of one client share it, and decode a frame once for all of them. */
 export class LocalClient {
   constructor() {
@@ -86,7 +93,7 @@ export class LocalClient {
   }
 
   /**
-   * Makes a call to the thread. Calls are answered in their order.
+   * Makes a call to the thread. Calls are answered in their order. One that is aborted before it is sent has no effect.
    * @param {keyof import("./worker.js").Calls} name
    * @param {any} call
    * @param {AbortSignal} [signal]
@@ -99,9 +106,12 @@ export class LocalClient {
     const { lastProblem } = this;
     const sending = this.before.then(async () => {
       this.check(lastProblem);
+      // Another worker would be started in vain.
+      if (!this.worker && isOfSessions(name, call)) throw new Problem(ENDED);
       const worker = await this.started();
       const { sent, handed } = (await taken) ?? { sent: undefined, handed: [] };
       this.check(lastProblem);
+      signal?.throwIfAborted();
       this.calls += 1;
       const number = this.calls;
       // Fails with what cannot be copied; then nothing waits.
@@ -272,8 +282,13 @@ export class LocalSession {
 
   /** Ends the session.
    * @returns {Promise<void>} */
-  end() {
-    return this.client.call("end", { id: this.id });
+  async end() {
+    try {
+      await this.client.call("end", { id: this.id });
+    } catch (error) {
+      // It has ended with the client.
+      if (!(error instanceof Problem && error.isGone)) throw error;
+    }
   }
 }
 

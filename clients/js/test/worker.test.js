@@ -195,6 +195,34 @@ test("a call before `close` starts no worker after it", async () => {
   assert.equal(client.worker, undefined);
 });
 
+test("a session of before `close` is ended without another worker", async () => {
+  const client = new LocalClient();
+  const [session, other] = [await client.open(image, box, options), await client.open(image, box, options)];
+  const closing = client.close();
+  const ending = other.end();
+  await Promise.all([closing, ending, session.end()]);
+  await session.end();
+  for (const call of [() => session.track(image), () => session.snapshot(), () => session.read()])
+    await assert.rejects(call(), slug("session-not-found"));
+  assert.equal(client.worker, undefined, "a worker that nobody ends");
+  assert.deepEqual(await client.track([], image), []);
+  await client.close();
+});
+
+test("a call that is aborted before it is sent has no effect", async () => {
+  const client = new LocalClient();
+  const session = await client.open(image, box, options);
+  const abort = new AbortController();
+  const before = session.track(image);
+  const aborted = [session.track(image, abort.signal), client.open(image, box, { signal: abort.signal })];
+  const after = session.track(image);
+  abort.abort(new Error("no more"));
+  for (const call of aborted) await assert.rejects(call, /no more/);
+  assert.deepEqual([(await before).frame, (await after).frame], [1, 2]);
+  assert.equal(client.waiting.size, 0);
+  await client.close();
+});
+
 test("bundlers find the worker, and can put its modules into one script", () => {
   const folder = new URL("../", import.meta.url);
   const text = (/** @type {string} */ name) => readFileSync(new URL(name, folder), "utf8");

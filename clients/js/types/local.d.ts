@@ -51,7 +51,7 @@ export declare class LocalClient {
     /** @param {Problem} problem */
     fail(problem: Problem): void;
     /**
-     * Makes a call to the thread. Calls are answered in their order.
+     * Makes a call to the thread. Calls are answered in their order. One that is aborted before it is sent has no effect.
      * @param {keyof import("./worker.js").Calls} name
      * @param {any} call
      * @param {AbortSignal} [signal]
