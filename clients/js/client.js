@@ -1,6 +1,6 @@
 // A service: it opens sessions.
 
-import { boxText, bytesOf, checkNumber, frameOf } from "./given.js";
+import { boxText, bytesOf, checkNumber, frameOf, snapshotBytes } from "./given.js";
 import { MOST_KEPT, restoring } from "./kept.js";
 import { Session } from "./session.js";
 import { Transport, documentOf } from "./transport.js";
@@ -70,7 +70,7 @@ export class Client {
    */
   async restore(snapshot, signal, patience) {
     if (patience !== undefined) checkNumber("patience", patience);
-    const session = await this.create({ ...restoring(await bytesOf(frameOf(snapshot))), signal, patience });
+    const session = await this.create({ ...restoring(await snapshotBytes(snapshot)), signal, patience });
     try {
       // What opens a session does not tell the score.
       const response = await this.transport.call("GET", `sessions/${session.id}`, { signal, patience });

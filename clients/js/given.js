@@ -56,16 +56,34 @@ function sidesOf(image) {
   return [image.width, image.height];
 }
 
-/** The frame itself, whose buffer its owner may fill with another one afterwards; or a refusal. What a WebSocket would
- * send as a text or not at all is none, and shared memory is sent by no browser.
+/** A copy of bytes, whose buffer their owner may fill with others afterwards, or the file; nothing where it is neither.
+ * @param {unknown} given
+ * @returns {Blob | Uint8Array<ArrayBuffer> | undefined} */
+function ownOf(given) {
+  if (ArrayBuffer.isView(given)) return new Uint8Array(given.buffer, given.byteOffset, given.byteLength).slice();
+  const name = className(given);
+  if (FILES.includes(name)) return /** @type {Blob} */ (given);
+  if (name === "ArrayBuffer") return new Uint8Array(/** @type {ArrayBuffer} */ (given)).slice();
+  return undefined;
+}
+
+/** The frame itself; or a refusal. What a WebSocket would send as a text or not at all is none, and shared memory is
+ * sent by no browser.
  * @param {import("./client.js").Frame} frame
  * @returns {Blob | Uint8Array<ArrayBuffer>} */
 export function frameOf(frame) {
-  if (ArrayBuffer.isView(frame)) return new Uint8Array(frame.buffer, frame.byteOffset, frame.byteLength).slice();
-  const name = className(frame);
-  if (FILES.includes(name)) return /** @type {Blob} */ (frame);
-  if (name === "ArrayBuffer") return new Uint8Array(/** @type {ArrayBuffer} */ (frame)).slice();
+  const own = ownOf(frame);
+  if (own) return own;
   throw unsupported("A frame is a Blob, an ArrayBuffer or a Uint8Array with a JPEG, PNG or WebP file.");
+}
+
+/** The bytes of a snapshot; or a refusal.
+ * @param {import("./client.js").Frame} snapshot */
+export async function snapshotBytes(snapshot) {
+  const own = ownOf(snapshot);
+  if (own) return bytesOf(own);
+  const detail = "A snapshot is a Blob, an ArrayBuffer or a Uint8Array with what `snapshot()` or `save()` gave.";
+  throw new Problem({ type: "invalid-snapshot", status: 422, detail });
 }
 
 /** The bytes of a frame. A file is read, since it may be changed or removed before it is sent, or sent again.

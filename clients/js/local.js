@@ -1,5 +1,6 @@
 // Sessions in this page or process: no service, nothing is uploaded. The same calls as those of `Client` and `Session`.
 
+import { snapshotBytes } from "./given.js";
 import { ofNode } from "./platform.js";
 import { Problem } from "./problem.js";
 import { close, sendable } from "./transfer.js";
@@ -56,11 +57,11 @@ export class LocalClient {
   }
 
   /** Opens a session that goes on where a snapshot was taken: here, by another local session, or by the service.
-   * @param {Uint8Array} snapshot
+   * @param {import("./client.js").Frame} snapshot
    * @param {AbortSignal} [signal] */
   async restore(snapshot, signal) {
     const id = ++lastId;
-    const answer = await this.call("restore", { id, snapshot }, signal);
+    const answer = await this.call("restore", { id, snapshot: await snapshotBytes(snapshot) }, signal);
     return new LocalSession(this, id, answer);
   }
 

@@ -1,6 +1,6 @@
 // The tracker in this thread: `Tracker.create(image, box)`, `tracker.step(image)`.
 
-import { boxOf } from "./given.js";
+import { boxOf, snapshotBytes } from "./given.js";
 import { pixelsOf } from "./image.js";
 import { load } from "./module.js";
 import { Problem } from "./problem.js";
@@ -158,10 +158,10 @@ export class Tracker {
   }
 
   /** A tracker that goes on from a snapshot: of `save`, or of the service.
-   * @param {Uint8Array} snapshot */
+   * @param {import("./client.js").Frame} snapshot */
   static async load(snapshot) {
     await load();
-    const bytes = await trackerOf(snapshot);
+    const bytes = await trackerOf(await snapshotBytes(snapshot));
     return refusing(() => new Tracker(Wasm.load(bytes)));
   }
 

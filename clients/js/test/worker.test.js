@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { readFileSync, readdirSync } from "node:fs";
 import { test } from "node:test";
-import { LocalClient, Problem } from "../bagtrack.js";
+import { Client, LocalClient, Problem } from "../bagtrack.js";
 import { Tracker } from "../tracker.js";
 
 const [width, height] = [160, 120];
@@ -220,6 +220,26 @@ test("a call that is aborted before it is sent has no effect", async () => {
   for (const call of aborted) await assert.rejects(call, /no more/);
   assert.deepEqual([(await before).frame, (await after).frame], [1, 2]);
   assert.equal(client.waiting.size, 0);
+  await client.close();
+});
+
+test("a snapshot may be a file or a buffer, as it comes from a store; what is none is told as that", async () => {
+  const client = new LocalClient();
+  const session = await client.open(image, box, options);
+  await session.track(image);
+  const bytes = await session.snapshot();
+  for (const snapshot of [bytes, bytes.buffer, new Blob([bytes]), Buffer.from(bytes)]) {
+    assert.deepEqual((await client.restore(snapshot)).box, session.box);
+    const tracker = await Tracker.load(snapshot);
+    assert.deepEqual(tracker.box, session.box);
+    tracker.free();
+  }
+  const told = (/** @type {any} */ error) => slug("invalid-snapshot")(error) && /^A snapshot is/.test(error.message);
+  for (const none of /** @type {any[]} */ ([undefined, null, "bytes", { bytes }, Promise.resolve(bytes)])) {
+    await assert.rejects(client.restore(none), told);
+    await assert.rejects(Tracker.load(none), told);
+    await assert.rejects(new Client("http://localhost:1").restore(none), told);
+  }
   await client.close();
 });
 

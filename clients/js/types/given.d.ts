@@ -10,11 +10,14 @@ export declare function checkImage(image: any): undefined;
 /** The size in which an image is drawn; or a refusal, since in place of nothing a black frame would be tracked.
  * @param {import("./image.js").Drawable} image */
 export declare function sizeOf(image: import("./image.js").Drawable): number[];
-/** The frame itself, whose buffer its owner may fill with another one afterwards; or a refusal. What a WebSocket would
- * send as a text or not at all is none, and shared memory is sent by no browser.
+/** The frame itself; or a refusal. What a WebSocket would send as a text or not at all is none, and shared memory is
+ * sent by no browser.
  * @param {import("./client.js").Frame} frame
  * @returns {Blob | Uint8Array<ArrayBuffer>} */
 export declare function frameOf(frame: import("./client.js").Frame): Blob | Uint8Array<ArrayBuffer>;
+/** The bytes of a snapshot; or a refusal.
+ * @param {import("./client.js").Frame} snapshot */
+export declare function snapshotBytes(snapshot: import("./client.js").Frame): Promise<Uint8Array<ArrayBuffer>>;
 /** The bytes of a frame. A file is read, since it may be changed or removed before it is sent, or sent again.
  * @param {Blob | Uint8Array<ArrayBuffer>} frame
  * @returns {Promise<Uint8Array<ArrayBuffer>>} */

@@ -32,9 +32,9 @@ export declare class LocalClient {
         signal?: AbortSignal;
     }): Promise<LocalSession>;
     /** Opens a session that goes on where a snapshot was taken: here, by another local session, or by the service.
-     * @param {Uint8Array} snapshot
+     * @param {import("./client.js").Frame} snapshot
      * @param {AbortSignal} [signal] */
-    restore(snapshot: Uint8Array, signal?: AbortSignal): Promise<LocalSession>;
+    restore(snapshot: import("./client.js").Frame, signal?: AbortSignal): Promise<LocalSession>;
     /**
      * Tracks the next frame of several sessions.
      * @param {LocalSession[]} sessions

@@ -41,8 +41,8 @@ export declare class Tracker {
      * @param {(frame: Frame) => T} run */
     next<T>(image: Image | Frame, run: (frame: Frame) => T): Promise<T>;
     /** A tracker that goes on from a snapshot: of `save`, or of the service.
-     * @param {Uint8Array} snapshot */
-    static load(snapshot: Uint8Array): Promise<Tracker>;
+     * @param {import("./client.js").Frame} snapshot */
+    static load(snapshot: import("./client.js").Frame): Promise<Tracker>;
     /** The whole state as bytes: for `load`, and for a service that takes unsigned snapshots. */
     save(): Uint8Array<ArrayBuffer>;
     /**
