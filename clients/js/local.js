@@ -20,6 +20,11 @@ let lastId = 0;
 
 const ENDED = { type: "session-not-found", status: 404, detail: "The session has ended." };
 
+/** Browsers do not tell why. */
+const NOT_LOADED =
+  "The worker with the tracker cannot be loaded: its file is missing where the page looks for it, such as one that a " +
+  "bundler has left out, or a content security policy refuses it.";
+
 /** Whether a call is of sessions that were opened before.
  * @param {string} name
  * @param {{ids?: number[]}} call */
@@ -161,7 +166,7 @@ export class LocalClient {
         else this.receive(worker, data, ends);
       });
       worker.addEventListener("error", (/** @type {ErrorEvent} */ { message }) =>
-        fail(message || "The tracker cannot be loaded."),
+        fail(message || NOT_LOADED),
       );
       // Node.js alone tells when a worker ends without an error.
       worker.addEventListener("exit", () => fail("The worker with the tracker has ended, and all sessions with it."));

@@ -1,8 +1,11 @@
 // Sessions and their worker: what has ended or fails takes nothing else along.
 
 import assert from "node:assert/strict";
-import { readFileSync, readdirSync } from "node:fs";
+import { cpSync, mkdtempSync, readFileSync, readdirSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import { test } from "node:test";
+import { fileURLToPath, pathToFileURL } from "node:url";
 import { Client, LocalClient, Problem } from "../bagtrack.js";
 import { Tracker } from "../tracker.js";
 
@@ -241,6 +244,34 @@ test("a snapshot may be a file or a buffer, as it comes from a store; what is no
     await assert.rejects(new Client("http://localhost:1").restore(none), told);
   }
   await client.close();
+});
+
+test("a module or a worker that cannot be loaded is told by name", async (context) => {
+  const folder = mkdtempSync(join(tmpdir(), "bagtrack-parts-"));
+  context.after(() => rmSync(folder, { recursive: true }));
+  const [source, module] = [new URL("../", import.meta.url), "bagtrack_wasm_bg.wasm"];
+  const filter = (/** @type {string} */ path) => !path.endsWith(module);
+  cpSync(fileURLToPath(source), folder, { recursive: true, filter });
+  const parts = await import(pathToFileURL(join(folder, "tracker.js")).href);
+  const { LocalClient: Lacking } = await import(pathToFileURL(join(folder, "bagtrack.js")).href);
+  const client = new Lacking();
+  const told = (/** @type {any} */ { slug: kind, message }) => {
+    assert.equal(kind, "internal");
+    return message.includes("cannot be loaded from file:") && message.includes(module);
+  };
+  await assert.rejects(parts.Tracker.create(image, box), told);
+  await assert.rejects(client.open(image, box), told);
+  await client.close();
+  // In place of a browser, which says nothing else.
+  const browser = /** @type {any} */ (globalThis);
+  browser.Worker = class extends EventTarget {
+    constructor() {
+      super();
+      setTimeout(() => this.dispatchEvent(new Event("error")));
+    }
+  };
+  context.after(() => delete browser.Worker);
+  await assert.rejects(new LocalClient().open(image, box), /worker .* cannot be loaded.* missing .* content security policy/);
 });
 
 test("bundlers find the worker, and can put its modules into one script", () => {
