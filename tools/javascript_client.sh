@@ -22,6 +22,7 @@ if command -v npm >/dev/null && npm install --silent --no-audit --no-fund --pref
         echo "clients/js/types is not what the sources say; write it anew with \`npx tsc --project clients/js\`." >&2
         exit 1
     }
+    "$tools/node_modules/.bin/tsc" --ignoreConfig --noEmit --strict --target es2022 --module nodenext clients/js/test/use.ts
 else
     echo "Left out, for want of TypeScript from npm: the types of clients/js"
 fi

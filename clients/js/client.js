@@ -13,6 +13,8 @@ import { Transport, documentOf } from "./transport.js";
  * @property {number} [seed] Seed of all random draws; a random one when left out.
  * @property {Record<string, unknown>} [parameters] Parameters that are set otherwise than in the preset.
  * @property {AbortSignal} [signal]
+ *
+ * @typedef {new (url: URL, protocols: string[]) => import("./stream.js").Socket} SocketClass
  */
 
 /** A random UUID. Pages that do not come over HTTPS have no `crypto.randomUUID`. */
@@ -32,12 +34,13 @@ export class Client {
    * @param {number} [options.patience] Milliseconds in which a call that fails for a moment is made again (20,000).
    * @param {number} [options.snapshotEvery] Frames after which a session takes a snapshot, to go on after the service has
    *   lost it (30). At 0 it takes none, and such a session has ended.
-   * @param {typeof WebSocket} [options.WebSocket] For streams, where the platform has none: Node before 22.
+   * @param {SocketClass} [options.WebSocket] For streams, where the platform has none: Node before 22.
    */
   constructor(url, options = {}) {
     const patience = checkNumber("patience", options.patience ?? 20_000);
     this.transport = new Transport(url, options.key ?? "", patience);
     this.snapshotEvery = Math.min(checkNumber("snapshotEvery", options.snapshotEvery ?? 30), MOST_KEPT / 2);
+    /** @type {SocketClass | undefined} */
     this.WebSocket = options.WebSocket ?? globalThis.WebSocket;
   }
 

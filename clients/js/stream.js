@@ -19,6 +19,13 @@ import { documentOf, longest, pause } from "./transport.js";
  *   ends before that where the service answers eight times, and gives no stream.
  * @property {(isUp: boolean) => void} [onLine] Is told when the line breaks and when it is up again.
  *
+ * @typedef {object} Socket What a stream needs of a WebSocket: that of the package `ws` has less than a browser's.
+ * @property {((event: any) => void) | null} onmessage
+ * @property {((event: any) => void) | null} onclose
+ * @property {((event: any) => void) | null} onerror
+ * @property {(data: any) => void} send
+ * @property {() => void} close
+ *
  * @typedef {object} Waiting A frame without an answer.
  * @property {Blob | Uint8Array<ArrayBuffer>} frame
  * @property {{box?: import("./session.js").Box, see?: boolean}} header
@@ -80,7 +87,7 @@ export class FrameStream {
     this.outOfOrder = 0;
     /** @type {Waiting | undefined} Whose frame is being read: the next one to be sent. */
     this.reading = undefined;
-    /** @type {WebSocket | undefined} */
+    /** @type {Socket | undefined} */
     this.socket = undefined;
     /** @type {ReturnType<typeof setTimeout> | undefined} Ends a line that is silent. */
     this.silence = undefined;

@@ -13,17 +13,12 @@ export type OpenOptions = {
     parameters?: Record<string, unknown>;
     signal?: AbortSignal;
 };
+export type SocketClass = new (url: URL, protocols: string[]) => import("./stream.js").Socket;
 export declare class Client {
     transport: Transport;
     snapshotEvery: number;
-    WebSocket: {
-        new (url: string | URL, protocols?: string | string[]): WebSocket;
-        prototype: WebSocket;
-        readonly CONNECTING: 0;
-        readonly OPEN: 1;
-        readonly CLOSING: 2;
-        readonly CLOSED: 3;
-    };
+    /** @type {SocketClass | undefined} */
+    WebSocket: SocketClass | undefined;
     /**
      * @param {string | URL} url Where the service is, with its base path, where it has one.
      * @param {object} [options]
@@ -31,13 +26,13 @@ export declare class Client {
      * @param {number} [options.patience] Milliseconds in which a call that fails for a moment is made again (20,000).
      * @param {number} [options.snapshotEvery] Frames after which a session takes a snapshot, to go on after the service has
      *   lost it (30). At 0 it takes none, and such a session has ended.
-     * @param {typeof WebSocket} [options.WebSocket] For streams, where the platform has none: Node before 22.
+     * @param {SocketClass} [options.WebSocket] For streams, where the platform has none: Node before 22.
      */
     constructor(url: string | URL, options?: {
         key?: string;
         patience?: number;
         snapshotEvery?: number;
-        WebSocket?: typeof WebSocket;
+        WebSocket?: SocketClass;
     });
     /** The key that is sent with every call. */
     set key(/** @type {string} */ key: string);

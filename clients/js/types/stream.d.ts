@@ -29,6 +29,13 @@ export type StreamOptions = {
      */
     onLine?: (isUp: boolean) => void;
 };
+export type Socket = {
+    onmessage: ((event: any) => void) | null;
+    onclose: ((event: any) => void) | null;
+    onerror: ((event: any) => void) | null;
+    send: (data: any) => void;
+    close: () => void;
+};
 export type Waiting = {
     frame: Blob | Uint8Array<ArrayBuffer>;
     header: {
@@ -52,8 +59,8 @@ export declare class FrameStream {
     outOfOrder: number;
     /** @type {Waiting | undefined} Whose frame is being read: the next one to be sent. */
     reading: Waiting | undefined;
-    /** @type {WebSocket | undefined} */
-    socket: WebSocket | undefined;
+    /** @type {Socket | undefined} */
+    socket: Socket | undefined;
     /** @type {ReturnType<typeof setTimeout> | undefined} Ends a line that is silent. */
     silence: ReturnType<typeof setTimeout> | undefined;
     isUp: boolean;
