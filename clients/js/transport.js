@@ -131,10 +131,10 @@ export class Transport {
    * @param {number} patience Milliseconds in which a call is made again.
    */
   constructor(url, key, patience) {
-    this.url = new URL(url);
-    // `localhost:8080` is a URL, too, of the scheme `localhost`.
-    if (!/^https?:$/.test(this.url.protocol))
+    // `localhost:8080` is a URL, too, of the scheme `localhost`; `/service` and nothing at all are none.
+    if (!/^\s*https?:/i.test(String(url)))
       throw new TypeError(`The address ${url} does not begin with http:// or https://.`);
+    this.url = new URL(url);
     if (!this.url.pathname.endsWith("/")) this.url.pathname += "/";
     this.key = key;
     this.patience = patience;

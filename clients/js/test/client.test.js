@@ -36,8 +36,8 @@ test("why a service cannot be reached is told, and a certificate that nobody sig
 });
 
 test("an address or a key that no request takes is told at once, and a key is not shown", async () => {
-  for (const address of ["localhost:8080", "ftp://localhost/", "ws://localhost:8080"])
-    assert.throws(() => new Client(address), new RegExp(`TypeError: The address ${address} does not begin with http:`));
+  for (const address of ["localhost:8080", "ftp://localhost/", "ws://localhost:8080", "/service", "", undefined])
+    assert.throws(() => new Client(/** @type {any} */ (address)), new RegExp(`TypeError: The address ${address} does not begin with http:`));
   const [frame] = clip.frames;
   const isTold = (/** @type {any} */ error) => error instanceof TypeError && !/secret/.test(error.message);
   await assert.rejects(new Client("http://me:secret@localhost:8080").open(frame, clip.box), isTold);
