@@ -1,26 +1,26 @@
-// Tracking frames again: on from a box in an earlier frame, or back from it. What was there before stays until all of it
-// is done: it can be cancelled, and fail.
+// Tracking frames again, forwards or backwards from a box in an earlier frame. The rows of before stay until all frames
+// are tracked, so the user can cancel the work, and a failure loses nothing.
 
 import { rowOf, scaled } from "./boxes.js";
 import { close } from "./frames.js";
 
 /**
  * @typedef {object} Redoing
- * @property {(frame: number) => void} tell Is told of each frame.
- * @property {AbortSignal} signal Cancels it.
+ * @property {(frame: number) => void} tell Called with the number of each frame that is tracked.
+ * @property {AbortSignal} signal Cancels the tracking.
  */
 
 /**
  * Follows an object anew, from a box in an earlier frame up to the next one with a box that was drawn, or the last one.
  * @param {Run} run
- * @param {FollowedObject | undefined} known Nothing for a new one.
+ * @param {FollowedObject | undefined} known Undefined for a new object.
  * @param {number} frame
  * @param {Box} box
  * @param {Redoing} redoing
- * @returns {Promise<boolean>} Whether it goes on from what was learned before; else from the box alone.
+ * @returns {Promise<boolean>} False where the service refused a saved state: what was learned before may be lost.
  */
 export async function trackOn(run, known, frame, box, { tell, signal }) {
-  // A box that the run stopped before is older.
+  // A box that waits, because the run stopped before it was sent, is older than this one: drop it.
   if (run.underWay.length === 0) run.drawn?.refused();
   run.drawn = undefined;
   const object = known ?? run.newObject();
@@ -59,13 +59,13 @@ export async function trackOn(run, known, frame, box, { tell, signal }) {
  * Follows an object from a box in a frame backwards: to the box that was drawn before, or to the beginning of the video.
  * @param {Run} run
  * @param {FollowedObject} object
- * @param {number} frame A frame with a row of it.
+ * @param {number} frame A frame in which the object has a row.
  * @param {Redoing} redoing
  * @returns {Promise<number>} How many frames were tracked.
  */
 export async function trackBack(run, object, frame, { tell, signal }) {
   const drawn = [...object.rows.values()].filter((row) => row.corrected && row.frame < frame).map((row) => row.frame);
-  // An object's first box was drawn, too, and is kept.
+  // The first box of an object counts as drawn, so its row is never overwritten.
   const until = Math.max(-1, ...drawn);
   const follower = run.follower();
   /** @type {Row[]} */
@@ -104,11 +104,11 @@ export async function trackBack(run, object, frame, { tell, signal }) {
 }
 
 /**
- * Brings an object with a new session to the last frame again, after the page was loaded anew or a change was undone: from
- * its states, or from its last box.
+ * Brings an object in a new session up to the last frame, after the page was reloaded or a change was undone. Begins
+ * with the object's last saved state, or with its last box where there is none.
  * @param {Run} run
  * @param {FollowedObject} object
- * @param {number} [last] Its rows after this frame, up to the next box that was drawn, are tracked anew.
+ * @param {number} [last] The rows after this frame, up to the next drawn box, are replaced.
  */
 export async function catchUp(run, object, last = run.lastFrame) {
   const { source } = run;
@@ -141,13 +141,13 @@ export async function catchUp(run, object, last = run.lastFrame) {
 }
 
 /**
- * Goes on after the last frame, once what is under way is answered.
+ * Continues after the last frame, once all frames that were sent are answered.
  * @param {Run} run
- * @param {Source} source That of the run, or another one of the same frames.
+ * @param {Source} source The run's own, or a newly opened one with the same frames.
  */
 async function goOn(run, source) {
   await run.alone(async () => {
-    // It was stopped again, or left, while a box was followed.
+    // The run was stopped again, or replaced by another one, while `alone` waited.
     if (run.wake || run.isOver) return source === run.source ? undefined : source.stop();
     if (source !== run.source) {
       run.passedOver += run.source.skipped;
@@ -156,7 +156,7 @@ async function goOn(run, source) {
     }
     [run.isResting, run.hasAll, run.failure] = [false, false, undefined];
     for (const object of run.objects) {
-      // It may be deleted meanwhile, or the run left.
+      // The user may delete the object, or leave the run, while this one catches up.
       const isGone = () => run.isOver || !run.objects.includes(object);
       if (isGone()) continue;
       object.follower.end();
@@ -174,7 +174,7 @@ async function goOn(run, source) {
 /** Goes on with a run that has stopped.
  * @param {Run} run
  * @param {() => Promise<Source>} open
- * @param {Run["wake"]} own What was asked to: where the run has stopped again meanwhile, another one will be. */
+ * @param {Run["wake"]} own The run's `wake` at the call. If the run has another one since, this call does nothing. */
 export async function wake(run, open, own = run.wake) {
   if (!own || run.wake !== own) return;
   run.wake = undefined;
@@ -182,7 +182,7 @@ export async function wake(run, open, own = run.wake) {
     const source = await open();
     await goOn(run, source);
   } catch (error) {
-    // It can be tried again; where the run has failed meanwhile, with the source opened anew.
+    // Lets the user try again. A failure meanwhile may have set another `wake`, which opens the source anew: keep that.
     run.wake ??= own;
     run.failure = error;
     run.isResting = true;

@@ -6,11 +6,11 @@ export class Beginning {
   /** @param {Page} page */
   constructor(page) {
     this.page = page;
-    /** @type {Promise<unknown>} The source is where it was sent before. */
+    /** @type {Promise<unknown>} Resolves when the source has reached the last time asked for. */
     this.going = Promise.resolve();
     this.wanted = 0;
     const bar = input("begin-at");
-    /** @type {number | undefined} The frame that was stepped to. */
+    /** @type {number | undefined} The frame that the step buttons reached; undefined after the bar was moved. */
     this.frame = undefined;
     bar.addEventListener("input", () => {
       this.frame = undefined;
@@ -18,7 +18,7 @@ export class Beginning {
     });
   }
 
-  /** Is at the beginning of a source. */
+  /** Puts the bar at the beginning of the source. */
   reset() {
     this.frame = undefined;
     input("begin-at").max = String(this.page.run?.source.duration ?? 0);
@@ -35,7 +35,7 @@ export class Beginning {
     input("begin-at").setAttribute("aria-valuetext", text);
   }
 
-  /** A frame further, or back.
+  /** Moves by frames; back where `by` is negative.
    * @param {number} by */
   step(by) {
     const bar = input("begin-at");
@@ -57,7 +57,7 @@ export class Beginning {
     const wanted = (this.wanted += 1);
     this.tell(time);
     const isWanted = () => wanted === this.wanted && page.state === "first" && run === page.run;
-    // The source goes to one time after the other. Those that are overtaken are passed over.
+    // The source seeks to one time after the other. A time that a later one has replaced is skipped.
     this.going = this.going.then(async () => {
       if (!run?.source.goTo || !isWanted()) return;
       const picture = await run.source.goTo(time);

@@ -1,4 +1,4 @@
-// Drawing a box: by mouse, pen or keyboard, and by a finger once drawing is on: without it a finger scrolls the page.
+// Drawing a box by mouse, pen or keyboard; by a finger only after `arm`, because a finger scrolls the page otherwise.
 
 /** Least side of a box in pixels of the frame. */
 const LEAST = 6;
@@ -18,7 +18,7 @@ export class BoxDrawing {
   /**
    * @param {HTMLCanvasElement} canvas
    * @param {{start: () => boolean, change: (box: Box | undefined) => void, finish: (box: Box) => void,
-   *   tap: () => void, arm: (isArmed: boolean) => void}} told `start` says whether a box may be drawn now; `tap`, that a
+   *   tap: () => void, arm: (isArmed: boolean) => void}} told `start` says whether a box may be drawn; `tap`, that a
    *   finger touched the picture while drawing was off.
    */
   constructor(canvas, told) {
@@ -28,7 +28,7 @@ export class BoxDrawing {
     this.from = undefined;
     /** @type {Box | undefined} */
     this.box = undefined;
-    /** The pointer that draws: others touch the picture, too. */
+    /** The id of the pointer that draws; other fingers on the picture are ignored. */
     this.pointer = -1;
     /** Whether a finger draws. */
     this.isArmed = false;
@@ -39,11 +39,12 @@ export class BoxDrawing {
     canvas.addEventListener("pointerdown", (event) => this.down(event));
     canvas.addEventListener("pointermove", (event) => this.move(event));
     canvas.addEventListener("pointerup", (event) => this.up(event));
-    // Where its end is not told: the browser takes the pointer, or another window has it.
+    // No `pointerup` comes where the browser takes the pointer for itself, or another window gets it.
     const lost = () => this.from && this.cancel();
     canvas.addEventListener("lostpointercapture", ({ pointerId }) => pointerId === this.pointer && lost());
     addEventListener("blur", lost);
-    // Keys are the box's own no more, and the picture would stay dark. Another window gives the focus back.
+    // Without the focus, keys cannot finish a box, and the picture around it would stay dark. After a visit to another
+    // window, `hasFocus` is false here, and the canvas gets the focus back: then the box stays.
     canvas.addEventListener("blur", () => this.box && !this.from && document.hasFocus() && this.cancel());
     canvas.addEventListener("keydown", (event) => this.key(event));
   }
@@ -54,7 +55,7 @@ export class BoxDrawing {
     this.isArmed = isArmed;
     this.told.arm(isArmed);
     if (!isArmed) return;
-    // There arrows move the box.
+    // The arrow keys move the box only while the canvas has the focus.
     this.canvas.focus({ preventScroll: true });
     const { top, bottom } = this.canvas.getBoundingClientRect();
     if (bottom < 0 || top > innerHeight) this.canvas.scrollIntoView();
@@ -121,7 +122,7 @@ export class BoxDrawing {
     const arrow = ARROWS[event.key];
     const isEscape = event.key === "Escape";
     if (!arrow && event.key !== "Enter" && !(isEscape && this.box)) return;
-    // Without a box arrows step through the frames, but where one is about to draw.
+    // Without a box, the arrow keys step through the frames, unless `arm` was called.
     if (arrow && !this.box && !this.isArmed) return;
     event.preventDefault();
     if (isEscape) return this.cancel();

@@ -1,6 +1,7 @@
-// Boxes in the pixels that they are meant in: the video's own, or those that are tracked and shown.
+// Conversion of boxes between the pixels of the video and those of the picture that is tracked and shown, which may be
+// smaller.
 
-/** A box in pixels of another size of the same picture.
+/** Converts a box from pixels of a picture of size `from` to those of the same picture of size `to`.
  * @param {Box} box
  * @param {Size} to
  * @param {Size} from */
@@ -12,7 +13,7 @@ export function scaled(box, to, from) {
   return { x, y, width: rounded(box.width * across), height: rounded(box.height * down) };
 }
 
-/** What an answer tells of a frame, in the video's own pixels.
+/** The row for an answer of the tracker: its box in pixels of the video, its time in seconds.
  * @param {Answer} answer
  * @param {Picture} picture
  * @param {Size} size Of the video.
@@ -21,11 +22,11 @@ export function rowOf({ box, score, status }, { frame, time, image }, size, corr
   return { frame, time: Number(time.toFixed(3)), box: scaled(box, size, image), score, status, corrected };
 }
 
-/** What is shown of the objects in a frame.
+/** The boxes to paint over a frame, in pixels of the picture.
  * @param {Run} run
  * @param {number} frame
  * @param {Size} image
- * @param {FollowedObject} [chosen] The one that stands out; all of them where there is none. */
+ * @param {FollowedObject} [chosen] The object to emphasise; without one, all are. */
 export function shownIn({ objects, source }, frame, image, chosen) {
   const isNamed = objects.length > 1;
   return objects.flatMap((object) => {

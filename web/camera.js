@@ -5,7 +5,7 @@ import { addVideo, drawFrame, encoded, loaded } from "./source.js";
 /** @implements {Source} */
 export class Camera {
   /**
-   * @param {HTMLVideoElement} video That plays.
+   * @param {HTMLVideoElement} video Plays the stream already.
    * @param {MediaStream} stream
    */
   constructor(video, stream) {
@@ -19,7 +19,7 @@ export class Camera {
     this.isStopped = false;
     this.isShown = false;
     this.canvas = document.createElement("canvas");
-    /** When the first frame was taken, in seconds of the video. */
+    /** The `currentTime` of the video at the first frame, in seconds. */
     this.firstTime = 0;
     this.last = { frame: 0, time: 0 };
   }
@@ -41,7 +41,7 @@ export class Camera {
     next();
   }
 
-  /** What the camera sees now. */
+  /** Takes the present picture of the camera as the first frame. */
   async first() {
     this.isShown = false;
     this.firstTime = this.video.currentTime;
@@ -95,7 +95,7 @@ export class Camera {
 
 /** @param {HTMLElement} place */
 export async function openCamera(place) {
-  // Over plain HTTP there is no way to the camera, except at the machine itself.
+  // Browsers give the camera to pages over https and from localhost only.
   if (!isSecureContext) throw new DOMException("", "SecurityError");
   if (!navigator.mediaDevices) throw new DOMException("", "CameraNotFoundError");
   const wanted = { width: { ideal: 640 }, height: { ideal: 480 }, facingMode: "environment" };

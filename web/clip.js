@@ -3,7 +3,7 @@
 import { Stills } from "./stills.js";
 
 const FRAMES_A_SECOND = 25;
-/** How often a frame is asked for. */
+/** Requests for a frame, until loading fails. */
 const ATTEMPTS = 6;
 
 /** @param {string} address */
@@ -12,7 +12,7 @@ async function fetched(address) {
     const response = await fetch(address).catch(() => undefined);
     if (response?.ok) return response;
     if (attempt === ATTEMPTS) throw new Error("The sample clip cannot be loaded. Is the service still running?");
-    // The line may be back in a moment.
+    // The connection may be back in a moment.
     await new Promise((resolve) => setTimeout(resolve, 200 * attempt));
   }
 }

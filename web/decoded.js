@@ -3,7 +3,7 @@
 import { openImages } from "./images.js";
 import { Problem } from "./js/problem.js";
 
-/** The end of the JPEG file that bytes begin with; 0 where it has not all come.
+/** The length in bytes of the JPEG file at the beginning of `bytes`; 0 where its end has not arrived yet.
  * @param {Uint8Array} bytes */
 function endOfFirst(bytes) {
   let at = 2;
@@ -12,12 +12,12 @@ function endOfFirst(bytes) {
     marker = bytes[at + 1];
     at += 2 + bytes[at + 2] * 256 + bytes[at + 3];
   }
-  // Within the pixels a byte of ones is followed by a zero, or by the mark of a restart.
+  // Within the coded pixels, 0xff is followed by 0 or a restart marker only, so ff d9 is the end.
   for (; at + 1 < bytes.length; at += 1) if (bytes[at] === 0xff && bytes[at + 1] === 0xd9) return at + 2;
   return 0;
 }
 
-/** The JPEG files of a body in which they follow each other.
+/** Splits a body of concatenated JPEG files.
  * @param {ReadableStream<Uint8Array>} body */
 async function* filesOf(body) {
   let rest = new Uint8Array();
@@ -39,7 +39,7 @@ async function* filesOf(body) {
 /**
  * @param {File} file
  * @param {string} key An API key; empty where the service has none.
- * @param {(count: number) => void} tell Is told how many frames have come.
+ * @param {(count: number) => void} tell Called with the number of frames received so far.
  * @param {AbortSignal} signal
  */
 export async function openDecoded(file, key, tell, signal) {

@@ -1,12 +1,11 @@
-// The frames of a file, decoded one after the other. Each is asked for by its number, in the order in which they are
-// shown.
+// Decodes single frames of a file. Frames are numbered in the order of display, samples in that of decoding.
 
-/** Samples that wait for the decoder at a time. */
+/** Most samples in the decoder's queue. */
 const MOST_QUEUED = 4;
 /** Bytes of the file that are read at a time. */
 const READ_AHEAD = 1 << 20;
 
-/** The frames of an index: the sample of each, and their numbers by their times. */
+/** Maps frames to the samples of an index, and times in microseconds to frames. */
 export class FrameNumbers {
   /** @param {Index} index */
   constructor({ times, keys, shown }) {
@@ -14,9 +13,9 @@ export class FrameNumbers {
     this.samples = samples.sort((one, other) => times[one] - times[other]);
     this.numbers = new Map(this.samples.map((sample, number) => [times[sample], number]));
     let key = keys.indexOf(1);
-    /** For each sample the one that decoding begins with: it needs no other ones. */
+    /** For each sample, the last key frame up to it: decoding must begin there. */
     this.keyOf = Array.from(keys, (isKey, sample) => (key = isKey ? sample : key));
-    /** In seconds. */
+    /** The time of each frame, in seconds. */
     this.times = this.samples.map((sample) => times[sample] / 1e6);
   }
 }
@@ -42,17 +41,17 @@ export class FrameDecoder {
     this.wanted = 0;
     /** @type {Map<number, VideoFrame>} Frames that came out before they were wanted. */
     this.ready = new Map();
-    /** Something has come out, or gone in. */
+    /** Wakes `step`: the decoder has given a frame, taken a sample, or failed. */
     this.changed = () => {};
-    /** @type {Promise<unknown>} What was asked for before has come. */
+    /** @type {Promise<unknown>} Settles when the frame that was asked for before is decoded. */
     this.before = Promise.resolve();
-    /** A part of the file. */
+    /** The part of the file that was read last, and its offset. */
     this.part = { begin: 0, bytes: new Uint8Array() };
   }
 
-  /** A frame; nothing where the decoder does not give it. It is quick where the frames before it were the last ones.
+  /** A frame; undefined where the decoder skips it. Fast where the last call was for the frame before.
    * @param {number} number
-   * @returns {Promise<VideoFrame | undefined>} Is to be closed. */
+   * @returns {Promise<VideoFrame | undefined>} The caller closes it. */
   at(number) {
     const asked = this.before.then(() => this.decode(number));
     this.before = asked.catch(() => undefined);
@@ -73,7 +72,7 @@ export class FrameDecoder {
     return frame;
   }
 
-  /** Begins with a sample that needs no other one.
+  /** Starts a new decoder at a key frame.
    * @param {number} sample */
   begin(sample) {
     this.close();
@@ -96,7 +95,7 @@ export class FrameDecoder {
     if (!decoder || this.failure) throw new DOMException("", "EncodingError");
     if (this.next === this.index.sizes.length) {
       await decoder.flush().catch(() => undefined);
-      // After that it takes only what needs no other samples.
+      // After a flush the decoder accepts a key frame only, so `decode` has to begin anew.
       this.last = Infinity;
     } else if (decoder.decodeQueueSize < MOST_QUEUED) {
       const chunk = await this.chunk(this.next);
@@ -116,7 +115,7 @@ export class FrameDecoder {
     this.changed();
   }
 
-  /** Gives up frames before one.
+  /** Closes the decoded frames before this number.
    * @param {number} number */
   drop(number) {
     for (const [early, frame] of this.ready) {

@@ -1,4 +1,4 @@
-// The frames of a file on their way: encoded, and in their order.
+// Encodes the frames of a played file as JPEG, several at a time, and delivers them in order.
 
 import { areEqual } from "./playback.js";
 import { encoded } from "./source.js";
@@ -7,22 +7,22 @@ import { encoded } from "./source.js";
  * @typedef {{image: HTMLCanvasElement, time: number, frame: number}} Taken
  */
 
-/** Frames that are encoded at a time. */
+/** Most frames that are encoded at the same time. */
 const MOST_ENCODING = 3;
 
 export class Delivery {
-  /** @param {() => void} changed Is told when a frame has left. */
+  /** @param {() => void} changed Called when a frame was delivered. */
   constructor(changed) {
     this.changed = changed;
     this.encoding = 0;
     this.isStopped = false;
-    /** @type {Promise<unknown>} The frames before are delivered. */
+    /** @type {Promise<unknown>} Resolves when all frames so far are delivered. */
     this.before = Promise.resolve();
     /** @type {(picture: Picture) => void} */
     this.deliver = () => undefined;
     /** @type {(error: unknown) => void} */
     this.fail = () => undefined;
-    /** @type {Taken | undefined} The last frame, where its image may be that of the one after it. */
+    /** @type {Taken | undefined} The last frame, held back while its image may be that of the frame after it. */
     this.doubted = undefined;
   }
 
@@ -30,22 +30,22 @@ export class Delivery {
     return this.encoding >= MOST_ENCODING;
   }
 
-  /** Whether the last frame has the image of the one after it, which is this.
+  /** Whether the frame that is held back has this image, which is that of the frame after it.
    * @param {HTMLCanvasElement} image */
   isAhead(image) {
     return this.doubted !== undefined && areEqual(image, this.doubted.image);
   }
 
-  /** Adds the next frame. The one before it is in no doubt any more.
+  /** Adds the next frame, and sends the one that was held back.
    * @param {Taken} taken
-   * @param {boolean} isDoubted Whether it waits for the one after it. */
+   * @param {boolean} isDoubted Whether to hold it back until the next frame comes. */
   add(taken, isDoubted) {
     this.settle();
     if (isDoubted) this.doubted = taken;
     else this.send(taken);
   }
 
-  /** Sends the last frame, where it waits: with this image, or with its own.
+  /** Sends the frame that is held back, if any: with this image, or else with its own.
    * @param {HTMLCanvasElement} [image] */
   settle(image) {
     const { doubted } = this;
@@ -67,7 +67,7 @@ export class Delivery {
     this.before.catch((error) => this.fail(error));
   }
 
-  /** Sends what waits, and ends when all are delivered. */
+  /** Sends the frame that is held back, and resolves when all frames are delivered. */
   async end() {
     this.settle();
     await this.before;

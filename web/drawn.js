@@ -1,13 +1,13 @@
-// A box that was drawn in the last frame: tracked once the frames on their way are answered, before those behind it.
+// A box that the user drew in the last frame. It is sent when all frames in flight are answered, before later frames.
 
 import { Problem } from "./js/problem.js";
 
 /**
- * @typedef {object} Drawn A box until it is answered.
+ * @typedef {object} Drawn A drawn box, until the tracker has answered.
  * @property {Box} box
- * @property {FollowedObject | undefined} object Nothing for a new one.
- * @property {() => void} sending Notes what is there before it, once the frames on their way are answered.
- * @property {() => void} refused Takes back what was noted of it.
+ * @property {FollowedObject | undefined} object Undefined for a new object.
+ * @property {() => void} sending Called right before the box is sent; saves the state for undo.
+ * @property {() => void} refused Drops what `sending` saved.
  * @property {boolean} [isSent]
  */
 
@@ -22,7 +22,7 @@ export async function sendDrawn(run) {
   run.underWay.push(sent);
   let isLeft = false;
   try {
-    // Until then no frame is sent: a new object would not know it.
+    // No frame is sent until the new object is added: its session would miss that frame.
     if (!object) await run.add(box);
     const asked = object?.follower.track(picture, { box });
     drawn.isSent = asked !== undefined;
@@ -34,7 +34,7 @@ export async function sendDrawn(run) {
     }
     isLeft = run.isResting && object !== undefined && !answer;
   } catch (error) {
-    // An object that cannot be added, or a box that cannot be followed, is no end of what is followed.
+    // Where an object cannot be added, or the tracker refuses a box, the run goes on with the other objects.
     const isRefused = !object || (error instanceof Problem && error.slug === "invalid-box");
     if (isRefused) drawn.refused();
     if (isRefused && !run.isOver) run.told.refuse(error);
@@ -42,7 +42,7 @@ export async function sendDrawn(run) {
     isLeft = !isRefused;
   }
   run.underWay = run.underWay.filter((other) => other !== sent);
-  // What is left comes again where one goes on.
+  // A box without an answer stays in `drawn`, and is sent again when the run goes on.
   drawn.isSent = false;
   if (run.drawn === drawn && !isLeft) run.drawn = undefined;
   if (isLeft) run.throttle();

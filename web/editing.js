@@ -1,4 +1,4 @@
-// What one does to objects: draw their boxes, correct them in any frame, track them again, name and delete them.
+// What the user does to objects: draw and correct boxes in any frame, track again, name and delete.
 
 import { BoxDrawing } from "./box.js";
 import { button, canvas, get } from "./dom.js";
@@ -7,7 +7,7 @@ import { MOST_OBJECTS } from "./objects.js";
 import { words } from "./problems.js";
 import { Undoing } from "./undo.js";
 
-/** Loaded when a source is open. */
+/** The module for tracking again, imported when a source opens: the first screen does without. */
 export const again = () => import("./again.js");
 
 export const DRAW = "Draw a box around what to follow.";
@@ -20,10 +20,10 @@ export class Editing {
   /** @param {Page} page */
   constructor(page) {
     this.page = page;
-    /** Whether the next box is that of a new object. */
+    /** Whether the next box makes a new object. */
     this.isAdding = false;
     this.undoing = new Undoing();
-    /** Cancels what is tracked again. */
+    /** Cancels the tracking of frames again. */
     this.cancelling = new AbortController();
     this.drawing = this.makeDrawing();
     this.list = this.makeList();
@@ -49,7 +49,7 @@ export class Editing {
     });
   }
 
-  /** Whether there are no pictures, which is said.
+  /** Whether the video is not at hand; then also asks the user to choose it.
    * @param {Run} run */
   wantsVideo({ source }) {
     if (source.isAbsent) this.page.say(`${ABSENT} Choose ${source.name} first.`, true);
@@ -59,10 +59,10 @@ export class Editing {
   startDrawing() {
     const { run } = this.page;
     if (!run || run.isOver || run.isRedoing || this.page.state === "opening" || this.wantsVideo(run)) return false;
-    // The first box is on its way.
+    // The first box was sent, and is not answered yet.
     if (this.page.hasRows && run.count === 0) return false;
     const { drawn, isResting, underWay } = run;
-    // What a run that is stopped has not sent is given up.
+    // A second box cannot follow one of a new object that still waits; only a stopped run replaces it.
     if (drawn && !drawn.object && !(isResting && underWay.length === 0)) {
       this.page.say(ON_ITS_WAY);
       return false;
@@ -76,19 +76,19 @@ export class Editing {
     return true;
   }
 
-  /** A box was drawn: the first one, a correction, or that of a new object.
+  /** Takes a box that was drawn: the first one, a correction, or one for a new object.
    * @param {Box} box */
   drawn(box) {
     const { run } = this.page;
     if (!run) return;
-    // The first one is shown until the tracker has it.
+    // The first box stays on the picture until the tracker has answered.
     if (this.page.state === "first") return void this.page.follow(run, box);
     this.page.stage.draw(undefined);
     const object = this.isAdding ? undefined : run.chosen;
     this.add(false);
     run.pause(this.page.state === "paused");
     if (this.page.viewed || run.isResting) return void this.trackOn(run, object, (this.page.viewed ?? run.picture).frame, box);
-    // Its session learns of the box.
+    // Undo needs a new session, because the present one learns from the box: so `follower` is not kept.
     const before = () => ({ ...this.undoing.before(run, object), follower: undefined });
     const step = before();
     this.undoing.push(step);
@@ -96,7 +96,7 @@ export class Editing {
     this.page.say(object ? "The box is corrected." : "Following another object.");
   }
 
-  /** Follows an object anew from an earlier frame on.
+  /** Follows an object again from an earlier frame on.
    * @param {Run} run
    * @param {FollowedObject | undefined} object
    * @param {number} frame
@@ -129,7 +129,7 @@ export class Editing {
   /**
    * @param {Run} run
    * @param {FollowedObject | undefined} object
-   * @param {(signal: AbortSignal) => Promise<string>} track Says what it did.
+   * @param {(signal: AbortSignal) => Promise<string>} track Resolves with the message for the user.
    */
   async tracksAgain(run, object, track) {
     const before = this.undoing.before(run, object);
@@ -157,7 +157,7 @@ export class Editing {
     this.cancelling.abort();
   }
 
-  /** Gives up the box that is drawn, else to draw one, and what is tracked again. */
+  /** Escape: drops the box that is being drawn; without one, ends drawing and cancels the tracking of frames again. */
   escape() {
     const { drawing } = this;
     if (drawing.box || drawing.from) return drawing.cancel();
@@ -175,7 +175,7 @@ export class Editing {
       const done = name ? `The last change to ${name} is undone.` : "There is nothing to undo.";
       this.page.say(done + (run.chosen ? "" : ` ${TAP}${DRAW}`));
       this.page.isUnsaved = true;
-      // It may be of those that were tracked backwards.
+      // The frame on the screen may be one that was tracked backwards, and that undoing has removed.
       if (!run.frames.times.has(this.page.shown?.frame ?? 0)) this.page.leave();
       this.page.seen.figures(run);
       this.page.repaint();
@@ -185,7 +185,7 @@ export class Editing {
     }
   }
 
-  /** A box that was drawn in the last frame cannot be followed.
+  /** Says that the tracker refused a box.
    * @param {unknown} error */
   refuse(error) {
     this.page.say(words(error, this.page.hasKey), true);
@@ -207,7 +207,7 @@ export class Editing {
     button("backwards").disabled = true;
   }
 
-  /** Makes the next box that of a new object, or not.
+  /** Says whether the next box makes a new object.
    * @param {boolean} isOn */
   add(isOn) {
     this.isAdding = isOn;

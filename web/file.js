@@ -1,8 +1,8 @@
-// The frames of a video file that is played: over plain http a page is not given the browser's decoders.
+// The frames of a video file, taken while a video element plays it: over plain http, pages have no `VideoDecoder`.
 //
-// The browser does not say which frames a file has. So the file is played and paused, and every frame that
-// the browser tells of is taken. Where the media times leave room for another one, the file is looked into right before
-// the later of the two frames; where that is not the earlier one, the file is played from there again, more slowly.
+// The browser does not say which frames a file has. So the file is played and paused, and every frame that the browser
+// reports is taken. Where two media times leave room for a frame between them, the page seeks to right before the
+// later one. If another frame than the earlier one appears there, that part is played again, more slowly.
 
 import { Delivery } from "./delivery.js";
 import { Gaps, SAME_PASSES } from "./gaps.js";
@@ -10,14 +10,14 @@ import { BEFORE, Playback, SAME, areEqual, isEmpty, learnRate } from "./playback
 import { GONE, isReadable } from "./problems.js";
 import { addVideo, drawFrame, encoded, loaded } from "./source.js";
 
-/** The rate that a file begins with, until the interval between its frames is known. */
+/** The playback rate at first, until `LEARNED_AFTER` frames have told the interval between frames. */
 const CAUTIOUS = 0.5;
 const LEARNED_AFTER = 6;
-/** After so many frames without a gap the file is played faster again. */
+/** Frames without a gap after which the file is played faster again. */
 const SPEEDS_UP_AFTER = 40;
-/** A sound that goes on for longer after the last frame is no reason to look for frames, in seconds. */
+/** In seconds. Where the file goes on for longer after the last frame, that is sound alone, without frames to find. */
 const LONGEST_TAIL = 1;
-/** Pictures of the screen after which a frame is shown that was told of. */
+/** Repaints of the screen after which a reported frame can be read from the element. */
 const SETTLES_AFTER = 3;
 
 /** @param {HTMLCanvasElement} image
@@ -28,9 +28,9 @@ const pictureOf = async (image, frame, time) => ({ image, blob: await encoded(im
 /** @implements {Source} */
 export class VideoFile {
   /**
-   * @param {HTMLVideoElement} video That can be played.
+   * @param {HTMLVideoElement} video Has loaded the file.
    * @param {File} file
-   * @param {HTMLElement} place Where the element is.
+   * @param {HTMLElement} place The parent of the element.
    */
   constructor(video, file, place) {
     this.video = video;
@@ -39,31 +39,31 @@ export class VideoFile {
     this.files = [file];
     this.name = file.name;
     this.duration = video.duration;
-    /** @type {number | undefined} Frames a second, where they had to be learned ahead. */
+    /** @type {number | undefined} Frames a second, from the first frames of the file. */
     this.learned = undefined;
-    /** @type {VideoFile | undefined} Shows frames out of their order. */
+    /** @type {VideoFile | undefined} A second element, for single frames at any time. */
     this.reader = undefined;
-    /** @type {Promise<unknown>} What it was asked for before is shown. */
+    /** @type {Promise<unknown>} Settles when `reader` has shown the last frame asked for. */
     this.looked = Promise.resolve();
     this.isLive = false;
     this.size = { width: video.videoWidth, height: video.videoHeight };
-    /** Frames that could not be had, for all passes. */
+    /** Frames that no pass over their gap has shown. */
     this.skipped = 0;
     this.isHeld = false;
     this.isStopped = false;
     this.playback = new Playback(video, file);
     this.hasEnded = false;
-    /** @type {number | undefined} The time of a frame that is taken in a moment; infinite when it has gone by. */
+    /** @type {number | undefined} The time of a frame that waits to be taken; infinite once a later one shows. */
     this.settling = undefined;
     /** @type {HTMLCanvasElement | undefined} The frame that was taken last. */
     this.lastImage = undefined;
-    /** How often the next one looked the same. */
+    /** How often the next frame looked the same as the last one. */
     this.samePasses = 0;
-    /** The frame that was taken last: its number, its media time, and how many the browser had shown then.
+    /** The frame that was taken last: its number, its media time, and `presentedFrames` of the browser then.
      * @type {{frame: number, time: number, shown: number | undefined}} */
     this.last = { frame: 0, time: 0, shown: undefined };
     this.firstTime = 0;
-    /** The shortest time between two frames. */
+    /** The shortest time between two frames, in seconds. */
     this.interval = Infinity;
     this.gaps = new Gaps(this);
     this.sinceGap = 0;
@@ -81,25 +81,25 @@ export class VideoFile {
     const shown = await this.playback.seek(0);
     this.firstTime = shown?.mediaTime ?? 0;
     const picture = await this.begin(0, this.firstTime, shown);
-    // Some browsers say that they can play what has no whole frame, and show nothing.
+    // Some browsers load a file without one whole frame, and show nothing.
     if (shown || !isEmpty(this.lastImage)) return picture;
     this.close();
     throw new Error(`${this.name} is cut in its first frame: there is no picture in it. Choose another copy of it.`);
   }
 
-  /** Begins at a time. What is not played has no number: it is counted from the rate of the file's first frames.
+  /** Begins at a time. Nobody counted the frames before it: its number is estimated from the rate of the first frames.
    * @param {number} time
    * @param {number} [frame] Its number, where it is known. */
   async goTo(time, frame) {
     this.learned ??= await learnRate(this.playback);
-    // The times of rows are rounded, perhaps to before the frame.
+    // The times of rows are rounded, perhaps to a time before the frame.
     const sought = frame === undefined ? time : time + BEFORE;
     const shown = await this.playback.reach(Math.min(sought, this.duration));
     const shownTime = shown?.mediaTime ?? time;
     return this.begin(frame ?? Math.round((shownTime - this.firstTime) * this.learned), shownTime, shown);
   }
 
-  /** Takes the frame that is shown as the one before all others.
+  /** Takes the frame on the screen as the first one.
    * @param {number} frame
    * @param {number} time
    * @param {VideoFrameCallbackMetadata | undefined} shown */
@@ -109,7 +109,7 @@ export class VideoFile {
     return pictureOf(this.lastImage, frame, time);
   }
 
-  /** Any frame, by an element of its own: the file plays on meanwhile.
+  /** Any frame, from a second element: this one plays on meanwhile.
    * @param {number} frame
    * @param {number} time */
   at(frame, time) {
@@ -135,14 +135,14 @@ export class VideoFile {
     };
     video.requestVideoFrameCallback(next);
     video.onended = () => this.ended();
-    // In a hidden page frames are not told of.
+    // In a hidden page the browser reports no frames, so playing pauses.
     document.addEventListener("visibilitychange", this.adjust);
     video.playbackRate = CAUTIOUS;
     this.adjust();
     return this.playback.broken;
   }
 
-  /** Takes the frame that is shown, if it is the next one.
+  /** Takes the reported frame, if it is the next one.
    * @param {VideoFrameCallbackMetadata} shown */
   look({ mediaTime: time, presentedFrames }) {
     const { last } = this;
@@ -150,7 +150,7 @@ export class VideoFile {
     if (time <= last.time + SAME) {
       last.shown = presentedFrames;
     } else if (this.settling !== undefined) {
-      // The frame that was waited for has gone by.
+      // A later frame is on the screen before the awaited one was taken.
       if (time > this.settling + SAME) this.settling = Infinity;
     } else if (this.gaps.mayPassOver(last.time, time, steps)) {
       this.gaps.lookInto(time, steps);
@@ -160,8 +160,8 @@ export class VideoFile {
     this.adjust();
   }
 
-  /** Takes the frame that is shown after a while: some browsers tell of a frame before they give it away, and when the
-   * machine is busy, give away the next one.
+  /** Takes a reported frame after a few repaints: some browsers report a frame before it can be drawn to a canvas, and
+   * on a busy machine draw the next one.
    * @param {number} time
    * @param {number} shown */
   async settle(time, shown) {
@@ -173,7 +173,7 @@ export class VideoFile {
     if (this.isStopped) return;
     if (isGone) return this.takeGone(time);
     const image = drawFrame(this.video);
-    // What looks the same may be the frame before, which is given away for longer than it is told of.
+    // An equal image may still be the frame before: some browsers draw it for a while after they report the next one.
     const isSame = this.lastImage !== undefined && this.samePasses < SAME_PASSES && areEqual(image, this.lastImage);
     if (isSame) {
       this.samePasses += 1;
@@ -183,7 +183,7 @@ export class VideoFile {
     this.adjust();
   }
 
-  /** Goes back to the frame that has gone by before it was taken. On a busy machine each one would, when it is played.
+  /** Goes back to a frame that another has replaced before it was taken. On a busy machine that can be every frame.
    * @param {number} time */
   async takeGone(time) {
     const shown = await this.playback.seek(time + SAME / 2);
@@ -195,10 +195,10 @@ export class VideoFile {
     this.gaps.goOnFrom(shown);
   }
 
-  /** Goes back to the frame that was taken last: it or the next one was given away for the other. */
+  /** Goes back to the last frame taken, and takes its image again: the browser drew one frame for the other. */
   async retake() {
     const { time } = this.last;
-    // Rounding leads to before it otherwise.
+    // Without the addition, rounding could lead to the frame before.
     const shown = await this.playback.seek(time + SAME / 2);
     if (this.isStopped) return;
     if (!shown || Math.abs(shown.mediaTime - time) > SAME) return this.gaps.resume();
@@ -211,7 +211,7 @@ export class VideoFile {
    * @param {HTMLCanvasElement} image
    * @param {number} time
    * @param {number | undefined} shown
-   * @param {boolean} [isDoubted] Whether the image may be that of the frame after it. */
+   * @param {boolean} [isDoubted] Whether the image may be that of the frame after this one. */
   take(image, time, shown, isDoubted = false) {
     const frame = this.last.frame + 1;
     this.interval = Math.min(this.interval, time - this.last.time);
@@ -225,32 +225,32 @@ export class VideoFile {
     else if (this.sinceGap % SPEEDS_UP_AFTER === 0) video.playbackRate = Math.min(1, video.playbackRate * 1.5);
   }
 
-  /** Plays or pauses. */
+  /** Plays or pauses the element, as the state asks for. */
   adjust() {
     const { video } = this;
     const isBusy = this.playback.isSeeking || this.settling !== undefined;
     const isAtEnd = this.isStopped || this.hasEnded || video.ended;
     if (!isAtEnd && !isBusy && !this.isHeld && !document.hidden && !this.delivery.isFull) {
       if (!video.paused) return;
-      // It may be paused again before it plays.
+      // `AbortError` only says that the element was paused before it played.
       video.play().catch((error) => error.name === "AbortError" || this.playback.fail(error));
     } else if (!video.paused) {
       video.pause();
     } else if (video.ended && !isBusy) {
-      // One that was gone to does not tell its end.
+      // After a seek to the end, no `ended` event comes.
       this.ended();
     }
   }
 
   async ended() {
     if (this.playback.isSeeking || this.isStopped) return;
-    // The last frame may be told of after the end.
+    // The browser may report the last frame after the `ended` event.
     for (let count = 0; count < 2; count += 1) await new Promise((resolve) => setTimeout(resolve, 50));
     while (this.settling !== undefined) await new Promise(requestAnimationFrame);
     if (this.playback.isSeeking || this.isStopped || this.hasEnded || !this.video.ended) return;
     const [{ duration }, { time }] = [this.video, this.last];
     const tail = Number.isFinite(duration) ? duration - time : 0;
-    // There the file ends again, or plays on.
+    // After that look, the file plays on and ends once more.
     if (tail < LONGEST_TAIL && this.gaps.mayPassOver(time, duration, 1)) return this.gaps.lookInto(duration, 1);
     this.hasEnded = true;
     await this.delivery.end();
@@ -271,7 +271,7 @@ export class VideoFile {
     URL.revokeObjectURL(this.video.src);
   }
 
-  /** Gives up the element that shows frames out of their order. */
+  /** Stops, and removes the second element as well. */
   close() {
     this.stop();
     this.reader?.stop();
@@ -289,7 +289,7 @@ export async function openPlayed(file, place) {
   video.src = URL.createObjectURL(file);
   try {
     await ready;
-    // Only its sound can be played.
+    // The browser can play the sound, but not the picture.
     if (video.videoWidth === 0) throw new DOMException("", "NotSupportedError");
   } catch (error) {
     video.remove();

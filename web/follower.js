@@ -1,4 +1,4 @@
-// What follows an object: a session in this page, or one of the service. Frames go in, answers come out.
+// Follows one object by a session of the tracker, in this page or at the service.
 
 import { LocalClient } from "./js/local.js";
 import { Problem } from "./js/problem.js";
@@ -10,10 +10,10 @@ import { Problem } from "./js/problem.js";
  * @property {(error: unknown) => void} fail
  */
 
-/** Frames on their way at a time. */
+/** Most frames sent and not answered. */
 export const WINDOW = 8;
 
-/** Tracks a frame for all objects at once: it is decoded once. */
+/** Collects the objects' requests for one frame into one call, so that the frame is decoded once. */
 class Batch {
   /** @param {LocalClient} client */
   constructor(client) {
@@ -32,7 +32,7 @@ class Batch {
     if (this.open?.picture !== picture) {
       this.flush();
       this.open = { picture, see: false, sessions: [], told: [] };
-      // The other objects ask for it in the same turn.
+      // The other objects ask for this frame in the same turn of the event loop.
       queueMicrotask(() => this.flush());
     }
     const { open } = this;
@@ -125,10 +125,10 @@ export class ServiceFollower {
     /** Whether the session has answered. */
     this.hasAnswered = false;
     this.isOver = false;
-    /** @type {{picture: Picture, box: Box} | undefined} What was answered last. */
+    /** @type {{picture: Picture, box: Box} | undefined} The last picture with an answer, and its box. */
     this.last = undefined;
     /** @type {{picture: Picture, header: Header, resolve: (answer: Answer | undefined) => void,
-     *   reject: (problem: unknown) => void, by?: object}[]} Oldest first; `by` is the stream that has it. */
+     *   reject: (problem: unknown) => void, by?: object}[]} Oldest first; `by` is the stream that sent it. */
     this.waiting = [];
   }
 
@@ -142,7 +142,7 @@ export class ServiceFollower {
    * @returns {Promise<Answer>} */
   async open(picture, box) {
     const session = await this.client.open(picture.blob, box);
-    // It may be at work on a state that was of too late a frame.
+    // `goBackBefore` may have restored a session from a state of too late a frame: end that.
     this.leave();
     this.last = { picture, box: session.box };
     this.connect(session);
@@ -198,7 +198,7 @@ export class ServiceFollower {
     } catch (problem) {
       if (this.stream !== stream) return;
       if (!stream.isEnded) this.waiting = this.waiting.filter((other) => other !== sent);
-      // A frame that is refused is no end of the stream.
+      // The stream goes on after the service refused one frame.
       if (stream.isEnded) this.fail(problem);
       else sent.reject(problem);
     }
@@ -206,7 +206,7 @@ export class ServiceFollower {
 
   /** @param {unknown} problem */
   fail(problem) {
-    // Such as a service with other keys after its restart, which does not take the session's snapshot.
+    // The service may have restarted with other keys, which do not fit the session's snapshot: begin another session.
     if (problem instanceof Problem && problem.isGone && this.hasAnswered && !this.isOver) this.goOn();
     else this.giveUp(problem);
   }
@@ -233,7 +233,7 @@ export class ServiceFollower {
     }
   }
 
-  /** Of now: frames on their way may be in it. */
+  /** The present state; frames that are sent and not answered may be in it. */
   async save() {
     const taken = await this.own.call("GET", "/snapshot");
     return new Uint8Array(await taken.arrayBuffer());
@@ -251,21 +251,21 @@ export class ServiceFollower {
 
   leave() {
     const { session, stream } = this;
-    // Its end is no failure then.
+    // `fail` ignores the end of a stream that is not `this.stream`.
     this.session = this.stream = undefined;
     stream?.close();
-    // One that cannot be ended expires.
+    // A session that cannot be ended expires at the service.
     session?.end().catch(() => undefined);
   }
 }
 
-/** Where the frames of a run are tracked, for one object.
+/** A follower for one object of a run, in the page or at the service.
  * @param {Run} run
  * @returns {Follower} */
 export function followerOf(run) {
   const { client, source, told } = run;
   if (client instanceof LocalClient) return new LocalFollower(client);
-  // Whoever tracks with one that is no object's own is told by its answers.
+  // The follower of a draft is no object's own: its caller gets the failure from `open` or `track` instead.
   const isOwn = () => run.objects.some((object) => object.follower === follower);
   const follower = new ServiceFollower(client, source.isLive, {
     line: (isUp) => told.line(isUp),

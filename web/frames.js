@@ -1,23 +1,23 @@
-// The frames that were tracked: their times, and the pictures of as many as memory allows.
+// The frames that were tracked: the times of all, the pictures of the last `MOST_BYTES`.
 
 import { GONE, isReadable } from "./problems.js";
 
-/** Most bytes of pictures. */
+/** Most bytes of encoded pictures that are kept. */
 const MOST_BYTES = 512 << 20;
 
-/** Answers that the rate is taken over. */
+/** The number of answers that the rate is averaged over. */
 const RATE_OVER = 30;
 
 export class Frames {
   /** @param {Source} source */
   constructor(source) {
     this.source = source;
-    /** @type {Map<number, number>} Seconds from the beginning of the video, by numbers in the video. */
+    /** @type {Map<number, number>} Seconds from the beginning of the video, by frame number. */
     this.times = new Map();
     /** @type {Map<number, Blob>} */
     this.blobs = new Map();
     this.bytes = 0;
-    /** Is told where a picture cannot be had. */
+    /** Called when a picture cannot be read. */
     this.failed = (/** @type {unknown} */ _) => {};
   }
 
@@ -26,12 +26,12 @@ export class Frames {
     return [...this.times.keys()].sort((one, other) => one - other);
   }
 
-  /** The numbers of those whose pictures can be had. */
+  /** The numbers of the frames that can be shown: the picture is kept, or the source can read it again. */
   get shown() {
     return this.source.at ? this.numbers : this.numbers.filter((frame) => this.blobs.has(frame));
   }
 
-  /** Keeps a frame. The oldest pictures go where there are too many.
+  /** Keeps a frame. Drops the oldest pictures over `MOST_BYTES`.
    * @param {Picture} picture */
   keep({ frame, blob, time }) {
     this.times.set(frame, time);
@@ -44,7 +44,7 @@ export class Frames {
     }
   }
 
-  /** Gives up a frame that is not tracked after all.
+  /** Removes a frame that no object has a row of.
    * @param {number} frame */
   forget(frame) {
     this.bytes -= this.blobs.get(frame)?.size ?? 0;
@@ -52,14 +52,14 @@ export class Frames {
     this.times.delete(frame);
   }
 
-  /** Its picture; nothing where it is not to be had.
+  /** The picture of a frame; undefined for a frame that was not tracked, or whose picture nobody has.
    * @param {number} frame */
   async at(frame) {
     const [time, blob] = [this.times.get(frame), this.blobs.get(frame)];
     if (time === undefined) return undefined;
     if (!blob) return this.read(frame, time);
     const image = await createImageBitmap(blob).catch(async (error) => {
-      // It may be a file.
+      // The blob may be a file of the user, which was removed since.
       return this.fail((await isReadable(blob)) ? error : GONE);
     });
     return { blob, time, frame, image };
@@ -78,7 +78,7 @@ export class Frames {
     throw error;
   }
 
-  /** The one before a frame: one that was tracked, or one of the source.
+  /** The picture before a frame: of the nearest earlier tracked frame, or else from the source.
    * @param {number} frame */
   async before(frame) {
     const { numbers, source } = this;
@@ -95,18 +95,18 @@ export class Pace {
   constructor() {
     /** @type {number[]} */
     this.times = [];
-    /** Milliseconds from sending the last one to its answer. */
+    /** Milliseconds from sending the last frame to its answer. */
     this.trip = 0;
   }
 
-  /** @param {number} sent When. */
+  /** @param {number} sent When the frame was sent, by `performance.now()`. */
   answered(sent) {
     const now = performance.now();
     this.trip = now - sent;
     this.times = [...this.times, now].slice(-RATE_OVER);
   }
 
-  /** Frames a second, of the last answers. */
+  /** Frames a second, averaged over the last answers. */
   get rate() {
     const { times } = this;
     if (times.length < 2) return 0;

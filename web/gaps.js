@@ -1,32 +1,32 @@
-// The times between two frames that a file has told of: whether there is another frame in one, and which.
+// Looks for frames that the browser did not report, in gaps between the media times of two frames of a played file.
 
 import { BEFORE, SAME, isTimeOf } from "./playback.js";
 import { drawFrame } from "./source.js";
 
-/** A time between two frames of so many intervals is one that another frame may be in. */
+/** A gap of so many frame intervals may have another frame in it. */
 const GAP = 1.5;
 const SLOWEST = 0.25;
-/** Most passes over a gap with frames in it. After the first one they are gone to, one by one. */
+/** Most passes over a gap with frames in it. The first pass plays it again; later ones seek to each frame. */
 const MOST_PASSES = 6;
-/** A gap that cannot be looked into, and is the same at so many passes, belongs to the file. */
+/** If the browser does not say what it shows after a seek: a gap that is the same at so many passes has no frames. */
 export const SAME_PASSES = 2;
-/** Most frames of a gap that are taken at a time. */
+/** Most frames that one pass takes from a gap. */
 const MOST_BETWEEN = 12;
-/** Some browsers go to the next key frame where it is near: then the way back begins so many seconds earlier. */
+/** Seconds before the last frame to seek to, tried in order: some browsers go on to a key frame that is near. */
 const LEADS = [0, 0.5, 1.5, 5];
 
 export class Gaps {
   /** @param {import("./file.js").VideoFile} file */
   constructor(file) {
     this.file = file;
-    /** A time between two frames that was looked into, and what came of it. */
+    /** The last gap that was looked into, and what was found; `isOfTheFile`: there is no frame in it. */
     this.gap = { from: -1, to: -1, isOfTheFile: false, passes: 0, same: 0 };
   }
 
-  /** Whether there may be a frame in between.
+  /** Whether there may be an unreported frame between two media times in seconds.
    * @param {number} from
    * @param {number} to
-   * @param {number} steps How many frames the browser has shown. */
+   * @param {number} steps How many frames the browser has presented meanwhile. */
   mayPassOver(from, to, steps) {
     const isLong = to - from > this.file.interval * GAP;
     // The first interval has nothing to be compared with.
@@ -35,7 +35,7 @@ export class Gaps {
     return isSuspect && !(gap.isOfTheFile && gap.from === from && Math.abs(gap.to - to) < SAME);
   }
 
-  /** Looks for a frame between the one that was taken last and this one.
+  /** Looks for a frame between the one that was taken last and the one at `to`.
    * @param {number} to
    * @param {number} steps */
   async lookInto(to, steps) {
@@ -54,7 +54,7 @@ export class Gaps {
     const { interval } = this.file;
     const isNext = found !== undefined && interval < Infinity && found - last.time <= interval * GAP;
     if (found !== undefined && (isNext || (gap.passes > 1 && gap.passes < MOST_PASSES))) {
-      // Where there is room for one frame only, there is no other one.
+      // Within `GAP` intervals after the last frame there is no room for another one.
       const frames = await this.goBack({ image: drawFrame(video), time: found }, isNext);
       if (this.file.isStopped) return;
       if (frames.length === 0) return this.resume();
@@ -71,14 +71,14 @@ export class Gaps {
     await this.resume();
   }
 
-  /** Plays on from the frame that is shown, which was taken.
+  /** Plays on from the frame on the screen, which was taken.
    * @param {VideoFrameCallbackMetadata | undefined} shown */
   goOnFrom(shown) {
     this.file.last.shown = shown?.presentedFrames;
     this.file.adjust();
   }
 
-  /** Plays on from the frame that was taken last, or from one before it. */
+  /** Seeks to the frame that was taken last, or to one before it, and plays on from there. */
   async resume() {
     const { last } = this.file;
     for (const lead of LEADS) {
@@ -90,10 +90,10 @@ export class Gaps {
   }
 
   /**
-   * Goes from a frame to those before it, down to the one that was taken last. What lies after the first of them is
-   * looked for again; all, where the browser does not tell what it shows.
+   * Goes back frame by frame, down to the one that was taken last. Returns the earliest `MOST_BETWEEN` frames of the
+   * gap: another pass finds the rest. Returns none where the browser does not say what it shows.
    * @param {{image: HTMLCanvasElement, time: number}} frame
-   * @param {boolean} isNext Whether there is none before it.
+   * @param {boolean} isNext Whether `frame` is the first one of the gap.
    */
   async goBack(frame, isNext) {
     const frames = [frame];
@@ -110,7 +110,7 @@ export class Gaps {
   }
 
   /**
-   * The time of the frame that is shown after a seek; nothing where it is not told, or not after the last one.
+   * The media time of the frame after a seek; undefined if the browser does not say it, or the frame was taken before.
    * @param {VideoFrameCallbackMetadata | undefined} shown
    * @param {number} sought
    */
@@ -118,7 +118,7 @@ export class Gaps {
     return isTimeOf(shown, sought) && shown.mediaTime > this.file.last.time + SAME ? shown.mediaTime : undefined;
   }
 
-  /** Counts how often a gap was looked into, and how often it was the same one.
+  /** Counts the passes over a gap, and those with the same end.
    * @param {number} to
    * @param {number} steps */
   countPass(to, steps) {

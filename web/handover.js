@@ -1,4 +1,4 @@
-// Handing over to the service what was tracked in the page, so that others can go on with it.
+// Hands objects that were tracked in the page over to the service, as sessions that other clients can go on with.
 
 import { catchUp } from "./again.js";
 import { scaled } from "./boxes.js";
@@ -6,9 +6,9 @@ import { refusedState } from "./objects.js";
 
 /**
  * @typedef {object} Handed
- * @property {string} name Of the object.
- * @property {string} id Of its session.
- * @property {boolean} isWhole Whether the session has all that the tracker has learned; else the last frame and its box.
+ * @property {string} name The object's.
+ * @property {string} id The session's.
+ * @property {boolean} isWhole Whether the session has the tracker's state; else it begins with the last frame and box.
  */
 
 /**
@@ -26,13 +26,13 @@ export async function handOver(run, client) {
   return handed;
 }
 
-/** A session with the tracker's state; nothing where the service does not take it, or where there is none.
+/** A session with the tracker's state; undefined where there is no state, or the service refuses it.
  * @param {Run} run
  * @param {FollowedObject} object
  * @param {Client} client */
 async function restored(run, object, client) {
   const save = async () => object.follower.save();
-  // Loaded anew, the page has no session yet, but its state of some frames before.
+  // After a reload, the page has no session yet, but a saved state of some frames before: catch up from there.
   const opened = async () => object.saves[0] && !run.source.isAbsent && run.alone(() => catchUp(run, object));
   const state = await save()
     .catch(() => opened().then(save))

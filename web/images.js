@@ -4,13 +4,13 @@ import { GONE, UnplayableError, isReadable } from "./problems.js";
 import { LONGEST_SIDE, drawScaled, encoded } from "./source.js";
 import { Stills } from "./stills.js";
 
-/** Images of a folder have no times of their own. */
+/** The frame rate for images, which have no times of their own. */
 const FRAMES_A_SECOND = 25;
-/** Bytes within which such a comment ends. */
+/** Bytes at the beginning of a JPEG file within which the comment with its time ends. */
 const LONGEST_COMMENT = 64;
 const IMAGE = /\.(jpe?g|png|webp|bmp|gif|avif|hei[cf]|tiff?)$/i;
 
-/** Kinds that few browsers read. */
+/** Formats that few browsers read. */
 const RARE = /\.(hei[cf]|tiff?)$/i;
 
 /** Whether a file is an image that a browser may show.
@@ -20,12 +20,12 @@ export const isImage = (file) => file.type.startsWith("image/") || IMAGE.test(fi
 /** @param {File} file */
 const pathOf = (file) => file.webkitRelativePath || file.name;
 
-/** The times in JPEG files that the service made of frames of a video: in their first comments. Nothing for other images.
+/** The times in seconds that the service writes into the first comment of its JPEG files; undefined for other images.
  * @param {File[]} images */
 async function timesIn(images) {
   const times = [];
   for (const image of images) {
-    // A byte that is no text is read as one character.
+    // Each byte that is no valid UTF-8 is read as one character, so `.{6}` is the six bytes before the comment.
     const head = await image.slice(0, LONGEST_COMMENT).text();
     const time = /^.{6}time=(-?[\d.]+)/s.exec(head);
     if (!time) return undefined;
@@ -36,20 +36,20 @@ async function timesIn(images) {
 
 /** Formats with animations, by the endings of names. */
 const ANIMATED = /(gif|webp|png|avif)$/i;
-/** What files of several frames have in them: of a GIF two of what begins a frame. */
+/** Matches files of several frames; for GIF, two headers of frames. */
 const FRAMES = /^RIFF.{4}WEBPVP8X.*ANMF|^.PNG.*acTL|\x00!\xf9\x04.{4}\x00[,!].*\x00!\xf9\x04.{4}\x00[,!]/s;
-/** How long a frame is shown, in microseconds: as browsers do where it has no time, or up to 10 ms.
+/** How long a frame is shown, in microseconds. A time of none, or up to 10 ms, counts as 100 ms, as browsers do.
  * @param {VideoFrame | undefined} frame */
 const shownFor = (frame) => (Number(frame?.duration) > 1e4 ? Number(frame?.duration) : 1e5);
 
-/** An animation, whose frames have times of their own; nothing where a file is a still image.
+/** Opens an animation; undefined where the file is a still image.
  * @param {File} file
  * @returns {Promise<Source | undefined>} */
 export async function openAnimated(file) {
   const format = ANIMATED.exec(file.type || file.name)?.[0].toLowerCase();
   if (!format) return undefined;
   const data = await file.arrayBuffer();
-  // Pages that came over plain http are not given it.
+  // Over plain http, pages have no `ImageDecoder`.
   if (typeof ImageDecoder === "undefined") {
     if (FRAMES.test(new TextDecoder("latin1").decode(data))) throw new UnplayableError(file);
     return undefined;
@@ -57,7 +57,7 @@ export async function openAnimated(file) {
   const decoder = new ImageDecoder({ data, type: `image/${format}` });
   await Promise.all([decoder.tracks.ready, decoder.completed]).catch(() => undefined);
   const count = decoder.tracks.selectedTrack?.frameCount ?? 0;
-  /** @type {Blob[]} Of damaged frames there is none. Some browsers give a frame only once: then it is closed. */
+  /** @type {Blob[]} By frame; empty at damaged ones. Encoded here, since some browsers decode each frame only once. */
   const blobs = [];
   const source = new Stills(file.name, FRAMES_A_SECOND, async (index) => blobs[index]);
   source.times = [];
@@ -82,7 +82,7 @@ export async function openAnimated(file) {
 }
 
 /** @param {File[]} files Images, all of one size.
- * @param {string[]} [names] Their paths in their folder, in the order of the files, where they have been opened before. */
+ * @param {string[]} [names] The paths in their folder, in the order of `files`, if these were opened before. */
 export async function openImages(files, names) {
   const order = new Intl.Collator("en", { numeric: true });
   let images = files.filter(isImage);
@@ -121,7 +121,7 @@ export async function openImages(files, names) {
   source.files = images;
   const more = rare.length > 1 ? ` and ${rare.length - 1} more` : "";
   if (isLeftOut) source.note = ` Left out, for this browser cannot read it: ${rare[0].name}${more}.`;
-  // Without the folder that was chosen.
+  // The paths within the chosen folder, without its name.
   source.imageNames = names ?? images.map((image) => pathOf(image).replace(/^[^/]*\//, ""));
   return source;
 }

@@ -1,4 +1,4 @@
-// The worker that reads where the frames of a video file are: only a worker can read a file piece by piece and wait.
+// The worker that reads the index of a video file: only workers have `FileReaderSync`, which the module calls.
 
 import init, { index } from "./wasm/bagtrack_demux.js";
 
@@ -17,14 +17,14 @@ import init, { index } from "./wasm/bagtrack_demux.js";
 onmessage = async ({ data: file }) => {
   try {
     await init({ module_or_path: new URL("./wasm/bagtrack_demux_bg.wasm", import.meta.url) });
-    // A worker has it, a page does not.
+    // The type checker knows the types of a page only.
     const reader = new /** @type {any} */ (globalThis).FileReaderSync();
     const read = (/** @type {number} */ offset, /** @type {number} */ length) =>
       new Uint8Array(reader.readAsArrayBuffer(file.slice(offset, offset + length)));
     const { codec, description, rotation, offsets, sizes, times, keys, shown } = index(read, file.size);
     postMessage({ codec, description, rotation, offsets, sizes, times, keys, shown });
   } catch {
-    // A file of another kind, or a damaged one.
+    // The file has another format, or is damaged.
     postMessage(undefined);
   }
 };

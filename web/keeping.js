@@ -1,5 +1,5 @@
-// Nothing is lost: each run is kept in the browser as it goes on. It comes back when the page is loaded anew, and can be
-// gone on with when another source has taken its place. A project file does the same by hand.
+// Keeps each run in the browser as it goes on. It comes back when the page is reloaded, and is offered again after
+// another source took its place. A project file does the same by hand.
 
 import { get, input } from "./dom.js";
 import { again } from "./editing.js";
@@ -8,13 +8,13 @@ import { keepWork, keptFiles, keptWork, ownWork, setOwnWork } from "./kept.js";
 import { isReadable } from "./problems.js";
 import { openFiles } from "./sources.js";
 
-/** Milliseconds after a change until it is kept, and one more for so many rows: all of them are written each time. */
+/** Milliseconds from a change until it is kept, plus one for every `ROWS` rows: each time, all rows are written. */
 const AFTER = 1000;
 const ROWS = 10;
 const CLIPS = ["card", "leaves"];
 /** @type {Promise<typeof import("./project.js")> | undefined} */
 let loaded;
-/** The first screen does not need these. A page that is left imports nothing anew. */
+/** Loads the module once: the first screen does without, and a page that is being left can import nothing. */
 const projects = () =>
   (loaded ??= import("./project.js").catch((error) => {
     loaded = undefined;
@@ -26,20 +26,20 @@ export class Keeping {
   /** @param {Page} page */
   constructor(page) {
     this.page = page;
-    /** The entry of what is here. */
+    /** The id of the present run's entry. */
     this.id = "";
-    /** @type {Source | undefined} The one whose files are kept. */
+    /** @type {Source | undefined} The source whose files are in the entry. */
     this.source = undefined;
-    /** @type {IDBDatabase | undefined} Where they are kept. */
+    /** @type {IDBDatabase | undefined} The database that has them. */
     this.store = undefined;
     this.hasFiles = false;
-    /** Whether all of what is here is kept. */
+    /** Whether the entry has the whole run, with its files, and no change since. */
     this.isSafe = false;
     /** @type {number | undefined} */
     this.timer = undefined;
-    /** How often the browser was to forget what is here. */
+    /** How often the user pressed "Forget": a write that began before is undone. */
     this.forgotten = 0;
-    /** What was left for another source. */
+    /** The name of the source that another one has replaced, if it is kept. */
     this.left = "";
     get("forget").addEventListener("click", () => this.forget());
     document.addEventListener("visibilitychange", () => {
@@ -48,14 +48,14 @@ export class Keeping {
     });
   }
 
-  /** Keeps what is here, in a moment. */
+  /** Keeps the run after a delay. */
   changed() {
     this.isSafe = false;
     const rows = this.page.run?.objects.reduce((sum, object) => sum + object.rows.size, 0) ?? 0;
     this.timer ??= setTimeout(() => this.keep(), AFTER + rows / ROWS);
   }
 
-  /** @returns {Promise<boolean>} Whether all of what was here is kept. */
+  /** @returns {Promise<boolean>} Whether the whole run is kept. */
   async keep() {
     clearTimeout(this.timer);
     this.timer = undefined;
@@ -70,7 +70,7 @@ export class Keeping {
       const files = this.source === source && this.store === store ? undefined : smallFiles(source);
       const clip = clipOf(source);
       const { imageNames } = source;
-      // In one step: a page that is left ends it, and begins no other.
+      // One transaction for everything: a page that is being left completes it, but begins no other.
       const work = { id, at: Date.now(), isLocal, project, states: statesOf(run), clip, imageNames };
       const hasRoom = await keepWork(work, files);
       if (forgotten !== this.forgotten) return forget(id).then(() => false);
@@ -88,7 +88,7 @@ export class Keeping {
     }
   }
 
-  /** All objects were deleted. */
+  /** Removes the entry, after all objects were deleted. */
   async keepNothing() {
     this.source = undefined;
     await forget(this.id);
@@ -97,7 +97,7 @@ export class Keeping {
     return true;
   }
 
-  /** A run that is about to be stopped can go on later, where its source can be opened again. */
+  /** Lets a run that is about to stop go on later, if its source can be opened again. */
   letGoOn() {
     const { run } = this.page;
     if (!run?.source.goTo) return;
@@ -114,7 +114,7 @@ export class Keeping {
     run.wake = own;
   }
 
-  /** @param {string} text Of what is here; empty where nothing is kept of it. */
+  /** @param {string} text About the present run; empty where nothing of it is kept. */
   tell(text) {
     get("kept-own").hidden = text === "";
     get("kept-text").textContent = text;
@@ -132,8 +132,8 @@ export class Keeping {
     this.page.say("The browser has forgotten it.");
   }
 
-  /** Before another source takes the place of what is here: keeps that, and asks where not all of it can be kept.
-   * @returns {Promise<boolean>} Whether it may be left. */
+  /** Keeps the run before another source replaces it. Asks the user if not all of it can be kept.
+   * @returns {Promise<boolean>} Whether the other source may replace it. */
   async leave() {
     const { run } = this.page;
     this.left = "";
@@ -144,9 +144,9 @@ export class Keeping {
     return isKept || !this.page.isUnsaved || confirm(question);
   }
 
-  /** Another source is here.
-   * @param {string} [id] Its entry, where it has one.
-   * @returns {string} What is to be said of the one before it. */
+  /** Begins an entry for a new source, or takes the one with this id.
+   * @param {string} [id] The source's entry, where it has one.
+   * @returns {string} A sentence about the source before it, for the message; empty where there is none. */
   arrived(id = crypto.getRandomValues(new Uint32Array(2)).join("-")) {
     clearTimeout(this.timer);
     this.timer = undefined;
@@ -161,10 +161,10 @@ export class Keeping {
     return this.left && ` ${this.left} is kept: below you can go on with it.`;
   }
 
-  /** Brings back what this tab had; offers what others left. */
+  /** Brings back the run that this tab had before the reload, or offers those that no tab has open. */
   async begin() {
     const own = ownWork();
-    // A tab that was duplicated has it open.
+    // A duplicated tab has the same id, but its original holds the entry.
     const kept = own && (await claim(own)) ? await keptWork(own).catch(() => undefined) : undefined;
     if (kept && this.page.state === "start") return this.bringBack(kept, true);
     if (own && own !== this.id) {
@@ -174,7 +174,7 @@ export class Keeping {
     await this.offer();
   }
 
-  /** Offers what was left and no tab has open. */
+  /** Lists the kept runs that no tab has open. */
   async offer() {
     const works = await freeWorks().catch(() => []);
     get("works").replaceChildren(...works.map((work) => this.item(work)));
@@ -205,25 +205,25 @@ export class Keeping {
     return item;
   }
 
-  /** @param {Kept} kept That this page has open.
-   * @param {boolean} [isOwn] Whether this tab left it. */
+  /** @param {Kept} kept An entry that this page has claimed.
+   * @param {boolean} [isOwn] Whether this tab had it before the reload. */
   async bringBack({ id, isLocal, project, states, clip, imageNames }, isOwn = false) {
     const files = (await keptFiles(id).catch(() => undefined)) ?? [];
     const open = async () => {
       input(isLocal ? "here" : "there").checked = true;
       if (clip) return openClip(clip);
-      // Some browsers do not copy a file, and it may be gone since.
+      // Some browsers store a reference to a file only, and the file may be gone since.
       if (!files[0] || !(await isReadable(files[0]))) return (await projects()).withoutVideo(project);
-      // Files that were kept have lost their folder.
+      // Stored files have lost the path in their folder, so the names come from the entry.
       return Object.assign(await openFiles(files, imageNames), { name: project.video.name, imageNames });
     };
-    // Another tab may have it open where browsers do not tell: then this one has a copy.
+    // Without `navigator.locks`, another tab may have the entry open: then this run gets a new entry, a copy.
     const own = isOwn || navigator.locks ? id : undefined;
     await this.page.opening.choose(open, async (run) => (await projects()).resume(this, run, project, states, own));
     if (this.id !== id) giveUp(id);
   }
 
-  /** Takes a project file, alone or with its video, and the video of a project that was opened without.
+  /** Opens a project file, alone or with its video; or the video of a project that was opened without it.
    * @param {File[]} files
    * @returns {Promise<boolean>} Whether it did. */
   async take(files) {
@@ -237,11 +237,11 @@ function told({ video, objects }) {
   return `${video.name}, ${objects.length} ${objects.length === 1 ? "object" : "objects"}, ${rows} rows`;
 }
 
-/** The sample that a source is.
+/** The name of the sample clip, if the source is one.
  * @param {Source} source */
 const clipOf = ({ name, files }) => CLIPS.find((clip) => clip === name && !files);
 
-/** The files of a source, where they are small enough to be copied.
+/** The files of a source; none where they are too large to be copied into the browser's database.
  * @param {Source} source */
 function smallFiles({ files = [] }) {
   return files.reduce((sum, { size }) => sum + size, 0) <= MOST_BYTES ? files : [];

@@ -1,23 +1,23 @@
-// What the browser keeps of the page, so that nothing is lost: of each run the project, the states of the trackers, and
-// the files where they are small. A run has an entry of its own, which one tab at a time has open.
+// The browser's database of runs. An entry has the project, the states of the trackers, and the files if they are
+// small. One tab at a time has an entry open.
 
 const NAME = "bagtrack";
-/** What the tab has open, also after it was loaded anew. */
+/** The `sessionStorage` key of this tab's entry, which survives a reload. */
 const OWN = "work";
 const STORE = "kept";
-/** Larger files are not copied. */
+/** Most bytes of a run's files that are copied into the database. */
 export const MOST_BYTES = 512 << 20;
-/** Entries that no tab has open. */
+/** Most entries that no tab has open. */
 const MOST = 5;
-/** Milliseconds after which they are forgotten. */
+/** Milliseconds after which such entries are removed. */
 const OLDEST = 30 * 24 * 3600 * 1000;
-/** Milliseconds in which a page that is loaded anew lets go of its entry. */
+/** Milliseconds to wait for the lock of an entry: after a reload, the old page may still hold it. */
 const PATIENCE = 1000;
 
 /** @type {Promise<IDBDatabase> | undefined} */
 let database;
 
-/** What runs are kept in. The browser may remove it: then it is another one. */
+/** The database. After the browser has closed it, the next call opens it again. */
 export function opened() {
   database ??= new Promise((resolve, reject) => {
     const request = indexedDB.open(NAME, 1);
@@ -37,16 +37,16 @@ export function opened() {
 /**
  * @template T
  * @param {IDBTransactionMode} mode
- * @param {(store: IDBObjectStore) => IDBRequest<T>} run The last one of its requests is answered.
+ * @param {(store: IDBObjectStore) => IDBRequest<T>} run Makes the requests, and returns the one whose result is wanted.
  */
 async function within(mode, run) {
   const transaction = (await opened()).transaction(STORE, mode);
   const request = run(transaction.objectStore(STORE));
-  // Without this, a page that is left at once takes back what it wrote.
+  // Without `commit`, the browser rolls the transaction back if the page is left right away.
   transaction.commit();
   return new Promise((resolve, reject) => {
     transaction.oncomplete = () => resolve(request.result);
-    // Want of room is told here.
+    // A full disk or quota aborts the transaction.
     transaction.onabort = () => reject(transaction.error ?? request.error);
   });
 }
@@ -54,10 +54,10 @@ async function within(mode, run) {
 /** @param {IDBValidKey} key */
 const read = (key) => within("readonly", (store) => store.get(key));
 
-/** Keeps a run. Where there is no room, it is kept without its files, or the oldest entry that no tab has open makes
- * room.
+/** Keeps a run. Where there is no room, keeps it without its files; if that fails too, removes the oldest entry that no
+ * tab has open, and tries again.
  * @param {Kept} kept
- * @param {File[]} [files] Instead of those that it has.
+ * @param {File[]} [files] Replace those in the entry.
  * @returns {Promise<boolean>} Whether there was room for the files. */
 export async function keepWork(kept, files) {
   try {
@@ -91,7 +91,7 @@ export const forget = (id) =>
     return store.delete(["work", id]);
   });
 
-/** The entries that no tab has open, newest first. Those that are too many or too old are forgotten. */
+/** The entries that no tab has open, newest first. Removes those over `MOST` or older than `OLDEST`. */
 export async function freeWorks() {
   await moveOld();
   /** @type {Kept[]} */
@@ -104,7 +104,7 @@ export async function freeWorks() {
   return free.filter(isLeft);
 }
 
-/** The entry that this tab has open; empty where there is none, or where the browser keeps nothing for pages. */
+/** The id of this tab's entry; empty where there is none, or where the browser denies storage to pages. */
 export function ownWork() {
   try {
     return sessionStorage.getItem(OWN) ?? "";
@@ -113,13 +113,13 @@ export function ownWork() {
   }
 }
 
-/** @param {string} id Empty where there is none any more. */
+/** @param {string} id Empty to unset. */
 export function setOwnWork(id) {
   try {
     if (id) sessionStorage.setItem(OWN, id);
     else sessionStorage.removeItem(OWN);
   } catch {
-    // It is not found again after the page is loaded anew.
+    // Without storage, a reload does not find the entry again.
   }
 }
 
@@ -134,15 +134,15 @@ async function moveOld() {
   });
 }
 
-/** @type {Map<string, () => void>} The entries that this page has open, and what gives them up. */
+/** @type {Map<string, () => void>} The ids of the entries that this page has open, each with what releases its lock. */
 const mine = new Map();
 
 /** @param {string} id */
 const lockOf = (id) => `bagtrack work ${id}`;
 
-/** Has an entry open, until it is given up or the page is left.
+/** Opens an entry for this page alone, until `giveUp` or until the page is left.
  * @param {string} id
- * @returns {Promise<boolean>} Not where another tab has it. Over plain http browsers do not tell. */
+ * @returns {Promise<boolean>} False where another tab has it. Over plain http there are no locks: always true. */
 export async function claim(id) {
   if (mine.has(id)) return true;
   mine.set(id, () => undefined);
@@ -158,7 +158,7 @@ export async function claim(id) {
 const locked = (id, options) =>
   new Promise((resolve) => {
     const granted = (/** @type {Lock | null} */ lock) => {
-      // It may have been given up meanwhile.
+      // `giveUp` may have been called before the lock was granted.
       const isHeld = lock !== null && mine.has(id);
       resolve(isHeld);
       return isHeld ? new Promise((release) => mine.set(id, () => release(undefined))) : undefined;

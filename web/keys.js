@@ -1,13 +1,13 @@
-// Shortcuts. They work wherever the focus is, but where one writes, and where a control takes the key itself.
+// Keyboard shortcuts. They work unless the focus is in a text field, or on a control that uses the key itself.
 
 import { button } from "./dom.js";
 
-/** What takes keys of its own. */
+/** Selectors of the controls that use all keys, the arrows, or the space bar. */
 const TEXT = "input:not([type=radio], [type=checkbox], [type=range])";
 const ARROWS = "input, pre";
 const SPACE = "input, button, a, summary";
 
-/** A key as it is on a Latin keyboard: others have letters of their own on it.
+/** The key's character; on keyboards without Latin letters, the Latin letter at that position.
  * @param {KeyboardEvent} event */
 const keyOf = ({ key, code }) => (/^[^\0-~]$/.test(key) && code.startsWith("Key") ? code[3].toLowerCase() : key);
 
@@ -22,7 +22,7 @@ export function press(event, page, step) {
   const isIn = (/** @type {string} */ controls) => target instanceof Element && target.closest(controls) !== null;
   if (!page.run || defaultPrevented || isIn(TEXT)) return;
   if (key === "Escape") return page.editing.escape();
-  // While a box is moved, the keys are its own.
+  // While a box is being drawn, `BoxDrawing` handles the keys.
   if (page.editing.drawing.box) return;
   const isUndoing = key.toLowerCase() === "z" && (event.ctrlKey || event.metaKey) && !event.shiftKey && !event.altKey;
   const isChord = event.ctrlKey || event.metaKey || event.altKey;

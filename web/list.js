@@ -6,8 +6,8 @@ import { get } from "./dom.js";
  * @typedef {object} Told
  * @property {(object: FollowedObject) => void} choose
  * @property {(object: FollowedObject) => void} remove
- * @property {(object: FollowedObject) => void} doubt Shows the next frame where it may be off.
- * @property {() => void} change A name, or what is shown, has changed.
+ * @property {(object: FollowedObject) => void} doubt Shows the next frame where its box may be wrong.
+ * @property {() => void} change A name or the visibility of an object has changed.
  */
 
 export class ObjectList {
@@ -20,7 +20,7 @@ export class ObjectList {
     this.told = told;
     /** @type {Map<FollowedObject, HTMLElement>} */
     this.items = new Map();
-    /** @type {WeakSet<FollowedObject>} Those that were deleted. */
+    /** @type {WeakSet<FollowedObject>} The objects that were deleted, and may come back by undo. */
     this.deleted = new WeakSet();
   }
 
@@ -36,7 +36,8 @@ export class ObjectList {
       const item = this.item(object);
       items.set(object, item);
       place.insertBefore(item, place.children[at]);
-      // It comes back: Enter would delete the one beside it. Only a new one is no reason to move.
+      // Undo brought the object back. The focus may be on another one's delete button: move it away, so that Enter
+      // does not delete that one. A new object does not move the focus.
       const isBack = this.deleted.has(object) && document.querySelector("#list .remove:focus-visible, #add:focus-visible");
       if (isBack) item.querySelector("input")?.focus();
     });
@@ -46,12 +47,12 @@ export class ObjectList {
     });
   }
 
-  /** Where it had the focus, the one beside it gets that; without one the button that adds another.
+  /** Removes an object's item. If it had the focus, the next item gets it, or else the button that adds an object.
    * @param {FollowedObject} object
    * @param {HTMLElement} item */
   remove(object, item) {
     const beside = item.nextElementSibling ?? item.previousElementSibling;
-    // Not where a mouse has clicked: then keys are the page's.
+    // After a click with the mouse, `:focus-visible` does not match, and the focus stays with the page's shortcuts.
     const hadFocus = item.querySelector(":focus-visible");
     item.remove();
     this.items.delete(object);
@@ -93,7 +94,7 @@ export class ObjectList {
   }
 }
 
-/** Says what a control does.
+/** Sets the label and the tooltip of a control.
  * @param {HTMLElement} control
  * @param {string} text */
 function tell(control, text) {

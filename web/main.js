@@ -1,4 +1,4 @@
-// What the buttons do.
+// The entry of the page: connects buttons and keys with their actions.
 
 import { get, input } from "./dom.js";
 import { Keeping } from "./keeping.js";
@@ -45,7 +45,7 @@ function step(by) {
 get("back").addEventListener("click", () => step(-1));
 get("forward").addEventListener("click", () => step(1));
 addEventListener("keydown", (event) => press(event, page, step));
-// Space is for the page again after a button was clicked; one that was reached by Tab keeps it.
+// Takes the focus off a button after a mouse click, so that Space is a shortcut again. One reached by Tab keeps it.
 addEventListener("click", ({ target, detail }) => {
   const clicked = detail > 0 && target instanceof Element ? target.closest("button") : undefined;
   if (clicked && clicked === document.activeElement) clicked.blur();
@@ -63,7 +63,7 @@ addEventListener("click", ({ target }) => {
 get("sources").addEventListener("keydown", (event) => {
   const sources = /** @type {HTMLDetailsElement} */ (get("sources"));
   if (!page.run || event.key !== "Escape") return;
-  // It is for nothing else.
+  // Escape closes the menu only: `press` ignores a prevented event.
   event.preventDefault();
   sources.open = false;
   sources.querySelector("summary")?.focus();

@@ -14,7 +14,7 @@
  * @typedef {(string | Uint8Array<ArrayBuffer>)[] } Pieces
  */
 
-/** Ids of elements. */
+/** The ids of Matroska elements. */
 const ID = {
   EBML: 0x1a45dfa3, DocType: 0x4282, DocTypeVersion: 0x4287, DocTypeReadVersion: 0x4285,
   Segment: 0x18538067, Info: 0x1549a966, TimestampScale: 0x2ad7b1, Duration: 0x4489,
@@ -24,10 +24,10 @@ const ID = {
   Cues: 0x1c53bb6b, CuePoint: 0xbb, CueTime: 0xb3, CueTrackPositions: 0xb7, CueTrack: 0xf7, CueClusterPosition: 0xf1,
   Cluster: 0x1f43b675, Timestamp: 0xe7, SimpleBlock: 0xa3,
 };
-/** The time of a block is 16 bits, of which one is the sign. */
+/** In milliseconds. The time of a block within its cluster is a signed 16-bit number. */
 const LONGEST_CLUSTER = 30_000;
 
-/** A number in so many bytes.
+/** A number in `length` bytes, big-endian.
  * @param {number} value
  * @param {number} length */
 function big(value, length) {
@@ -52,7 +52,7 @@ const ascii = (text) => new TextEncoder().encode(text);
 /** @param {Uint8Array<ArrayBuffer>[]} pieces */
 const total = (pieces) => pieces.reduce((sum, { length }) => sum + length, 0);
 
-/** An element: its id, its length in eight bytes, what is in it.
+/** An element: its id, its length in eight bytes, its content.
  * @param {number} id
  * @param {...(Uint8Array<ArrayBuffer> | Uint8Array<ArrayBuffer>[])} content
  * @returns {Uint8Array<ArrayBuffer>[]} */
@@ -63,7 +63,7 @@ function element(id, ...content) {
   return [big(id, Math.ceil(Math.log2(id + 1) / 8)), size, ...pieces];
 }
 
-/** Chunks that begin with a key frame and have times that fit.
+/** Groups frames into clusters: a new one at each key frame, and after `LONGEST_CLUSTER`.
  * @param {Chunk[]} chunks */
 function clustered(chunks) {
   /** @type {Chunk[][]} */
@@ -121,7 +121,7 @@ export function matroska(track, chunks, duration) {
   const info = element(ID.Info, element(ID.TimestampScale, uint(1e6)), element(ID.Duration, float(duration)), apps);
   const clusters = clustered(chunks);
   const written = clusters.map(cluster);
-  // Every number has eight bytes, so the index is as long before its positions are known.
+  // Every number has eight bytes, so the length of the index does not depend on the positions in it.
   const head = [...info, ...tracks(track)];
   let position = total(head) + total(cues(clusters, clusters.map(() => 0)));
   const positions = written.map((pieces) => {

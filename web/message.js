@@ -1,6 +1,6 @@
-// The line in which the page speaks, and what it says of the target.
+// The message line of the page, and the messages about the status of the target.
 
-/** A status that held for fewer frames is not said. */
+/** Frames that a new status must last to be announced; `lost` is announced at once. */
 const SAID_AFTER = 5;
 export const BEGINNING = "Beginning…";
 export const GO_ON = ' Press "Go on" to try again from there.';
@@ -12,7 +12,7 @@ export class Message {
     this.place = place;
     /** @type {string} The status of the last frame. */
     this.last = "tracking";
-    /** @type {string} The status that was said. */
+    /** @type {string} The status that was announced last. */
     this.said = "tracking";
     /** For how many frames the status has been the same. */
     this.held = 0;
@@ -27,13 +27,13 @@ export class Message {
     this.place.classList.toggle("bad", isBad);
   }
 
-  /** Begins with a target that is tracked. */
+  /** Begins with the status `tracking`. */
   follow() {
     this.last = this.said = "tracking";
     this.held = 0;
   }
 
-  /** Says a status when it has changed for some frames.
+  /** Announces a new status once it has lasted `SAID_AFTER` frames.
    * @param {"tracking" | "uncertain" | "lost"} status */
   take(status) {
     this.held = status === this.last ? this.held + 1 : 1;

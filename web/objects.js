@@ -1,27 +1,28 @@
-// The objects that are followed, each with its rows.
+// The objects that are followed, each with its rows: its boxes by frame.
 
 import { Problem } from "./js/problem.js";
 
 export const MOST_OBJECTS = 16;
-/** Frames after which the state is saved, so that one can go on from there. */
+/** Frames between two saved states of the tracker, from which tracking can go on. */
 export const SAVE_EVERY = 30;
-/** Most states of an object, of 70 kB each. */
+/** Most saved states of an object; a state has about 70 kB. */
 const MOST_SAVES = 128;
-/** Told apart on any picture, together with the dark line around them. */
+/** Distinguishable on any picture, together with the dark outline of a box. */
 const COLORS = [
   ...["#3ddc97", "#ffb000", "#5aa9ff", "#ff6b9d", "#c9a0ff", "#f4f165", "#ff8a5c", "#45e0e0"],
   ...["#a4e05a", "#ff5cf0", "#9db4ff", "#ffd9a0", "#5cffb4", "#e0a45a", "#d0d0d0", "#ff7a7a"],
 ];
 
-/** A service that was started again with other keys takes no states of before. What else fails is a failure.
+/** Turns the refusal of a state into undefined: a service that restarted with other keys refuses older states. Throws
+ * any other error.
  * @param {unknown} error
  * @returns {undefined} */
 export function refusedState(error) {
   if (!(error instanceof Problem && error.slug === "invalid-snapshot")) throw error;
 }
 
-/** Gives up states where there are too many. What is left lies closer the nearer the last frame is: the frames after a
- * correction are tracked again, and those from a state to it come on top.
+/** Drops states over `MOST_SAVES`, so that the rest lie closer together near the last frame. A correction costs the
+ * frames after it, and those between it and the state before: a gap counts relative to the distance to the last frame.
  * @param {TrackerState[]} saves */
 function thin(saves) {
   const at = (/** @type {number} */ index) => saves[index].after ?? 0;
@@ -44,13 +45,13 @@ export class FollowedObject {
     this.color = COLORS[number % COLORS.length];
     this.isShown = true;
     this.follower = follower;
-    /** @type {Map<number, Row>} By frames of the video, ascending. */
+    /** @type {Map<number, Row>} By frame number of the video, ascending. */
     this.rows = new Map();
-    /** @type {number[]} The frame of the video that each frame of the session was. */
+    /** @type {number[]} For each frame of the session, its number in the video. */
     this.frames = [];
     /** @type {TrackerState[]} Oldest first. */
     this.saves = [];
-    /** Whether the service has not taken a state. */
+    /** Whether the service has refused a state. */
     this.isForgotten = false;
   }
 
@@ -61,7 +62,7 @@ export class FollowedObject {
     if (this.frames.length % SAVE_EVERY === 0) this.save();
   }
 
-  /** Has a row that the session at work knows nothing of.
+  /** Adds a row that the present session has not tracked.
    * @param {Row} row */
   set(row) {
     this.rows.set(row.frame, row);
@@ -75,16 +76,16 @@ export class FollowedObject {
   async save() {
     const { frames } = this;
     const after = frames[frames.length - 1];
-    // Without it one goes on from an older one.
+    // If saving fails, tracking again begins at an older state.
     const bytes = await Promise.resolve()
       .then(() => this.follower.save())
       .catch(() => undefined);
-    // Meanwhile it may have gone back to an earlier frame.
+    // `goBackBefore` may have replaced `frames` during the save: then the state is of another past.
     if (bytes && frames === this.frames) this.saves.push({ bytes, frames, after });
     thin(this.saves);
   }
 
-  /** The same object in another session: what is tracked with it counts when it is adopted.
+  /** The same object in another session. Its rows take effect when `adopt` is called with it.
    * @param {Follower} follower */
   draft(follower) {
     const draft = new FollowedObject(this.number, follower);
@@ -92,9 +93,9 @@ export class FollowedObject {
     return draft;
   }
 
-  /** Takes the rows of a draft, and its session where that has come to the last frame.
+  /** Takes the rows of a draft; its session too, if that has tracked up to the last frame.
    * @param {FollowedObject} draft
-   * @param {number} until Its rows are of frames before this one. */
+   * @param {number} until The draft's rows end before this frame; infinite where they reach the last one. */
   adopt(draft, until) {
     this.rows = new Map([...this.rows, ...draft.rows]);
     this.sort();
@@ -106,16 +107,16 @@ export class FollowedObject {
     [this.follower, this.frames, this.saves] = [draft.follower, draft.frames, draft.saves];
   }
 
-  /** The first frame after this one with a box that was drawn; infinite where there is none.
+  /** The first frame after this one with a drawn box; infinite where there is none.
    * @param {number} frame */
   drawnAfter(frame) {
     const drawn = [...this.rows.values()].filter((row) => row.corrected && row.frame > frame);
     return Math.min(Infinity, ...drawn.map((row) => row.frame));
   }
 
-  /** Goes on with its session from a state before a frame of the video.
+  /** Restores the session from the last state before a frame of the video. Drops later and refused states.
    * @param {number} frame
-   * @returns {Promise<number | undefined>} The frame of the video that the state is of; nothing where there is none. */
+   * @returns {Promise<number | undefined>} The frame of the state; undefined where there is no state. */
   async goBackBefore(frame) {
     while (this.saves.length > 0) {
       const { bytes, frames } = this.saves[this.saves.length - 1];
@@ -131,7 +132,7 @@ export class FollowedObject {
     return undefined;
   }
 
-  /** The first frame after this one where the status gets worse; else the first of all.
+  /** The next frame after this one where a status other than `tracking` begins; after the last such frame, the first.
    * @param {number} frame */
   nextDoubtful(frame) {
     const rows = [...this.rows.values()];

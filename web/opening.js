@@ -1,4 +1,4 @@
-// Opening a source. What was there before stays until its first frame is there, and the last choice counts.
+// Opening a source. The present run stays until the first frame of the new source is there. The last choice counts.
 
 import { get, input } from "./dom.js";
 import { DRAW, TAP, again } from "./editing.js";
@@ -7,24 +7,24 @@ import { prepareSaving } from "./saving.js";
 import { offerDecoding } from "./sources.js";
 
 /**
- * @typedef {(run: Run) => Promise<boolean>} Resume Brings back what was tracked in a source, and says whether it did.
+ * @typedef {(run: Run) => Promise<boolean>} Resume Restores the rows of a source, and resolves with whether it did.
  */
 
 export class Opening {
   /** @param {Page} page */
   constructor(page) {
     this.page = page;
-    /** Counts the choices: one that is overtaken by another is dropped. */
+    /** Counts the choices: a source that opens after a later choice is dropped. */
     this.choice = 0;
     this.overtaken = new AbortController();
-    /** Keeps what is here, and says whether another source may take its place. */
+    /** Keeps the present run, and resolves with whether another source may replace it. */
     this.mayLeave = async () => true;
-    /** Is told that another source is here, and says what is to be said of the one before it. */
+    /** Called when another source is open; returns a sentence about the one before it, for the message. */
     this.arrived = () => "";
   }
 
-  /** Shows the first frame of a source and asks for a box. What was there before stays until then.
-   * @param {(signal: AbortSignal) => Promise<Source>} open Its signal says that another choice has overtaken it.
+  /** Shows the first frame of a source and asks for a box. The present run stays until then.
+   * @param {(signal: AbortSignal) => Promise<Source>} open Its signal is aborted when the user chooses another source.
    * @param {Resume} [resume] */
   async choose(open, resume) {
     const { page } = this;

@@ -1,4 +1,4 @@
-// The page: one state at a time, and how it comes from one to the next.
+// The page: a state machine, and what is shown in each state.
 
 import { Beginning } from "./begin.js";
 import { shownIn } from "./boxes.js";
@@ -16,10 +16,10 @@ import { Timeline } from "./timeline.js";
 
 /**
  * @typedef {"start" | "opening" | "first" | "following" | "paused" | "ended"} State `first` waits for the first box;
- *   from `following` on there are rows. What is shown in which state stands in the page, in `data-in` and `data-on`.
+ *   from `following` on there are rows. The attributes `data-in` and `data-on` of index.html list the states.
  */
 
-/** Frames that a timeline has room for from the beginning. */
+/** Frames that the timeline has room for at the beginning. */
 const LEAST_PART = 256;
 
 export class Page {
@@ -37,31 +37,31 @@ export class Page {
     this.player = new Player(this);
     /** @type {Run | undefined} */
     this.run = undefined;
-    /** @type {Picture | undefined} An earlier frame that is shown. */
+    /** @type {Picture | undefined} The earlier frame on the screen; undefined where that is the last. */
     this.viewed = undefined;
-    /** @type {number[][] | undefined} Of the last frame. */
+    /** @type {number[][] | undefined} The particles of the last frame: x, y, width, weight. */
     this.particles = undefined;
-    /** Counts the frames that are to be shown: one that is overtaken by another is dropped. */
+    /** Counts the requests to show a frame: one that is read after a later request is dropped. */
     this.view = 0;
-    /** @type {Promise<Picture> | undefined} What the camera saw as the drawing began. */
+    /** @type {Promise<Picture> | undefined} The camera's picture when the drawing began. */
     this.frozen = undefined;
     /** Whether there are results that were not saved. */
     this.isUnsaved = false;
     this.hasKey = false;
-    /** @type {(() => void) | undefined} Makes anew what failed for want of a key. */
+    /** @type {(() => void) | undefined} Repeats what failed for want of a key. */
     this.again = undefined;
-    /** Is told when rows or objects have changed. */
+    /** Called when rows or objects have changed. */
     this.changed = () => {};
-    /** Lets a run that has stopped go on later. */
+    /** Makes it possible for a run that stops to go on later. */
     this.letGoOn = () => {};
     /** @type {State} */
     this.state = "start";
     this.enter("start");
   }
 
-  /** The service. It is loaded once a source is there: what is tracked in the page needs none. */
+  /** The client of the service, imported on first use: tracking in the page needs none. */
   service() {
-    // What fails for longer is said.
+    // Requests that fail for longer than `patience` milliseconds are reported.
     this.client ??= import("./js/client.js").then(({ Client }) => new Client(new URL(".", location.href), { patience: 1500 }));
     this.client.catch(() => (this.client = undefined));
     return this.client;
@@ -71,7 +71,7 @@ export class Page {
     return this.state === "following" || this.state === "paused" || this.state === "ended";
   }
 
-  /** Whether frames after the last one can be tracked, though it was stopped. */
+  /** Whether a stopped run can go on after its last frame. */
   get canGoOn() {
     const { run } = this;
     return run?.wake !== undefined && run.source.goTo !== undefined && !run.isGone;
@@ -109,8 +109,8 @@ export class Page {
   }
 
   /** @param {unknown} error
-   * @param {() => void} [again] Makes it anew, with a key.
-   * @param {string} [way] What one can do without one. */
+   * @param {() => void} [again] Repeats what failed, after a key was given.
+   * @param {string} [way] A sentence on what the user can do, where no key is wanted. */
   fail(error, again, way = this.wayBack(error)) {
     this.again = again;
     const wantsKey = error instanceof Problem && error.slug === "unauthorized";
@@ -123,7 +123,7 @@ export class Page {
     this.changed();
   }
 
-  /** What tracks has failed, or the line that frames come over: one can go on where that stood.
+  /** The tracker or the source's connection has failed. The run stops, and may go on from its last frame.
    * @param {unknown} error */
   rest(error) {
     this.letGoOn();
@@ -134,7 +134,7 @@ export class Page {
     else this.fail(error, undefined, this.wayBack(error) || " Choose the video or the camera again.");
   }
 
-  /** What one can do where the run's file is gone.
+  /** What the user can do if the run's file is gone; empty for other errors.
    * @param {unknown} error */
   wayBack(error) {
     const { failure, isGone, source } = this.run ?? {};
@@ -169,7 +169,7 @@ export class Page {
     };
   }
 
-  /** Shows what the camera sees, until a box is drawn. */
+  /** Shows the camera's live picture, until a box is drawn. */
   preview() {
     this.run?.source.preview?.((image) => this.stage.show(image));
   }
@@ -183,13 +183,13 @@ export class Page {
     const { picture } = own;
     await this.beginning.going;
     const { state } = this;
-    // Another box may have been drawn meanwhile.
+    // The user may have drawn another box meanwhile, or opened another source.
     if (own !== this.run || state !== "first") return;
     this.enter("following");
     this.stage.draw(box, own.source.size.width);
     this.say(BEGINNING);
     try {
-      // The bar has gone on since: the box is of what was shown.
+      // The bar was moved after the box was drawn: go back to the picture with the box.
       if (picture !== own.picture) own.picture = (await own.source.goTo?.(picture.time, picture.frame)) ?? picture;
       if (this.frozen) own.picture = await this.frozen;
       await own.begin(box);
@@ -197,13 +197,13 @@ export class Page {
       this.stage.draw(undefined);
       if (this.state === "ended") return;
       this.say(FOLLOWING);
-      // It was stopped, and is to go on.
+      // The run was stopped before its first answer, and "Go on" was pressed.
       if (own.wake && this.state === "following") await this.player.goOn();
     } catch (error) {
       if (own !== this.run) return;
       this.enter(own.isResting && !own.wake ? "ended" : "first");
       this.fail(error, () => this.follow(own, box));
-      // It waits for a key.
+      // The box stays while the page waits for a key.
       if (get("key-form").hidden) this.stage.draw(undefined);
     }
   }
@@ -233,18 +233,18 @@ export class Page {
     const { run } = this;
     if (!run) return;
     this.particles = answer?.particles;
-    // Who looks at an earlier frame goes on doing so.
+    // An earlier frame that the user looks at stays on the screen.
     if (!this.viewed) this.show(shown, answer?.particles);
     this.seen.figures(run);
     this.isUnsaved = run.frames.times.size > 1;
     this.changed();
     if (!answer) return;
     this.seen.take(run, shown, answer);
-    // Frames that were on their way are answered after a stop.
+    // Frames in flight are answered after a stop: their status is no news.
     if (this.state !== "ended") this.message.take(answer.status);
   }
 
-  /** Shows a frame that was tracked, and pauses.
+  /** Pauses, and shows the tracked frame nearest to this one.
    * @param {number} frame */
   async seek(frame) {
     const { run } = this;
@@ -290,8 +290,8 @@ export class Page {
   }
 }
 
-/** Where the timeline of a video that is still tracked ends: about at its last frame, as far as is known. Of a long video
- * it has a part, which doubles as one comes to its end: one could hardly find a frame in what is tracked of it.
+/** The frame at the right end of the timeline; 0 for the last tracked one. While a long video is tracked, the timeline
+ * shows a part of it, which doubles as tracking nears its end: else the tracked part would be too narrow to pick from.
  * @param {Run} run */
 function endOf({ hasAll, lastFrame, source: { duration = 0, rate = 0 } }) {
   const last = Math.round(duration * rate);

@@ -1,18 +1,18 @@
-// Particles: the places that the tracker compared.
+// Painting particles: the places that the tracker compared. A particle is x, y, width, weight.
 
-/** A particle is as faint as can be from this share of the likeliest one's weight on, as a power of ten. */
+/** The power of ten of the share of the largest weight, at and below which a particle is painted faintest. */
 const FAINTEST = -9;
-/** From 0 to 1, how likely a particle is beside the likeliest one.
+/** How likely a particle is beside the likeliest one, on a logarithmic scale from 0 to 1.
  * @param {number[]} particle
  * @param {number} most */
 export const shareOf = ([, , , weight], most) => Math.max(0, 1 - Math.log10(weight / most || Number.MIN_VALUE) / FAINTEST);
 
-/** From blue for the least likely to yellow.
+/** A colour from blue, for a share of 0, to yellow, for 1.
  * @param {number} share
  * @param {number} alpha */
 export const colorOf = (share, alpha) => `hsl(${205 - 150 * share} 95% ${62 + 8 * share}% / ${alpha})`;
 
-/** Dots, the likelier the larger and warmer.
+/** Paints particles as dots: larger and warmer for a larger weight.
  * @param {CanvasRenderingContext2D} context
  * @param {number[][]} particles Likeliest first.
  * @param {number} unit A pixel of the screen. */

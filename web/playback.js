@@ -1,12 +1,12 @@
-// A video element that is gone to a time with, and what it shows then.
+// Seeking in a video element, and finding out which frame it shows then.
 
 import { GONE, isReadable } from "./problems.js";
 
-/** Media times that differ by less are the same frame's, in seconds. */
+/** In seconds. Media times that differ by less belong to the same frame. */
 export const SAME = 0.001;
-/** What is looked at before a frame lies so far before it, in seconds. */
+/** In seconds. A seek to so long before a frame shows the frame before it. */
 export const BEFORE = 0.002;
-/** How long a browser may take to show a frame that it went to, in milliseconds. */
+/** Milliseconds that a browser may take to show a frame after a seek. */
 const SHOWN_WITHIN = 500;
 
 export class Playback {
@@ -15,9 +15,9 @@ export class Playback {
   constructor(video, file) {
     this.video = video;
     this.isSeeking = false;
-    /** @type {(error?: unknown) => void} Ends it with an error; without one, where the file is gone. */
+    /** @type {(error?: unknown) => void} Rejects `broken` with the error; without one, only if the file is gone. */
     this.fail = () => {};
-    /** @type {Promise<never>} Fails when the rest cannot be played. */
+    /** @type {Promise<never>} Rejects when the rest cannot be played. */
     this.broken = new Promise((_, reject) => {
       this.fail = async (error) => {
         const isThere = await isReadable(file);
@@ -25,18 +25,18 @@ export class Playback {
       };
     });
     this.broken.catch(() => undefined);
-    // Browsers try for half a minute to read a file that is gone, and tell nothing meanwhile.
+    // Browsers try for half a minute to read a file that is gone, and report nothing meanwhile.
     video.onwaiting = video.onseeking = () => this.fail();
     video.onerror = () => this.fail(new DOMException("", "EncodingError"));
   }
 
-  /** Goes to a time, or fails.
+  /** Like `seek`, but rejects if the file cannot be played any more.
    * @param {number} time */
   reach(time) {
     return Promise.race([this.broken, this.seek(time)]);
   }
 
-  /** Goes to a time and waits until its frame is shown.
+  /** Goes to a time in seconds, and waits until its frame is shown.
    * @param {number} time
    * @returns {Promise<VideoFrameCallbackMetadata | undefined>} What is shown: a later frame, where the browser went on
    *   to the next key frame. */
@@ -49,7 +49,7 @@ export class Playback {
       /** @type {VideoFrameRequestCallback} */
       const next = (_, metadata) => {
         shown = metadata;
-        // What is told before the browser has gone there may be a later one.
+        // A frame reported before the seek is done may be a later one: wait for the next report.
         if (metadata.mediaTime <= time + SAME) resolve(undefined);
         else if (this.isSeeking) video.requestVideoFrameCallback(next);
       };
@@ -64,7 +64,8 @@ export class Playback {
   }
 }
 
-/** Whether the time of the frame is told. Some browsers tell the one that was sought, and some go on to a key frame.
+/** Whether the media time after a seek is that of the frame. Some browsers report the time sought instead, and some go
+ * on to a key frame.
  * @param {VideoFrameCallbackMetadata | undefined} shown
  * @param {number} sought
  * @returns {shown is VideoFrameCallbackMetadata} */
@@ -72,7 +73,7 @@ export function isTimeOf(shown, sought) {
   return shown !== undefined && shown.mediaTime < sought - SAME / 2;
 }
 
-/** Whether two canvases of one size show the same.
+/** Whether all pixels of two canvases of one size are equal.
  * @param {HTMLCanvasElement} one
  * @param {HTMLCanvasElement} other */
 export function areEqual(one, other) {
@@ -83,23 +84,23 @@ export function areEqual(one, other) {
   return a.every((pixel, at) => pixel === b[at]);
 }
 
-/** Whether nothing was drawn: what a video shows is opaque.
+/** Whether nothing was drawn on a canvas: pixels of a video are opaque.
  * @param {HTMLCanvasElement | undefined} image */
 export function isEmpty(image) {
   const data = image?.getContext("2d")?.getImageData(0, 0, image.width, image.height).data;
   return !data?.some((value) => value > 0);
 }
 
-/** Frames that tell the rate. */
+/** Frames that the rate is learned from. */
 const TELLING = 9;
-/** How long they may take, in milliseconds. */
+/** Milliseconds after which fewer frames suffice. */
 const LEARNED_WITHIN = 2000;
-/** Rates that files have. One that is nearly one of them is that one: some files round their times to milliseconds. */
+/** Usual rates. A measured rate within the share `NEARLY` of one counts as that: some files round times to 1 ms. */
 const USUAL = [10, 12, 15, 24000 / 1001, 24, 25, 30000 / 1001, 30, 48, 50, 60000 / 1001, 60, 120];
 const NEARLY = 0.004;
 
-/** The step from the frame before to this one; infinite where that is not told. A busy machine tells of no two frames that
- * follow each other.
+/** Seconds from the frame before to this one, found by a seek; infinite where the browser does not say. On a busy
+ * machine, playing may report no two consecutive frames.
  * @param {Playback} playback
  * @param {number} time */
 async function stepTo(playback, time) {
@@ -108,7 +109,7 @@ async function stepTo(playback, time) {
   return isTimeOf(before, sought) && time - before.mediaTime > SAME ? time - before.mediaTime : Infinity;
 }
 
-/** Frames a second, from the first frames of a file.
+/** Learns the frames a second by playing the first frames of a file.
  * @param {Playback} playback */
 export async function learnRate(playback) {
   const { video } = playback;

@@ -1,4 +1,4 @@
-// Going on, pausing, and playing what was tracked.
+// Going on, pausing, and playing the tracked frames.
 
 import { button } from "./dom.js";
 import { DRAW, TAP } from "./editing.js";
@@ -9,7 +9,7 @@ export class Player {
   /** @param {Page} page */
   constructor(page) {
     this.page = page;
-    /** The frame that it shows now is this view of the page: any other one ends it. */
+    /** The value of `page.view` while this plays: showing any other frame changes that, and so ends playing. */
     this.view = -1;
   }
 
@@ -17,7 +17,7 @@ export class Player {
     return this.view === this.page.view && this.page.state === "ended";
   }
 
-  /** What the button in the middle does. Where no more is tracked, it plays what was. */
+  /** The button in the middle: pauses or goes on; after the end, plays the tracked frames. */
   press() {
     const { state } = this.page;
     if (state === "paused") this.goOn();
@@ -26,13 +26,13 @@ export class Player {
     else this.play();
   }
 
-  /** Stays at the frame that it shows. */
+  /** Stops playing at the present frame. */
   stop() {
     if (this.isPlaying) this.page.view += 1;
     this.tell();
   }
 
-  /** Shows a frame that is so many before or after the one that is shown: numbers have gaps where frames were skipped.
+  /** Shows the tracked frame so many places before or after the present one: skipped frames do not count.
    * @param {number} by */
   step(by) {
     const { run, shown } = this.page;
@@ -43,7 +43,7 @@ export class Player {
     if (wanted !== undefined) this.page.seek(wanted);
   }
 
-  /** Takes the frames after the last one. */
+  /** Goes on tracking after the last frame. */
   async goOn() {
     const { page } = this;
     const { run, state } = page;
@@ -53,7 +53,7 @@ export class Player {
     page.enter("following");
     if (isStopped) page.say(run.wantsObject ? BEGINNING : FOLLOWING);
     page.pause(false);
-    // It goes on once its first box is followed.
+    // `Page.follow` goes on once the first box is answered.
     if (run.wantsObject) return;
     try {
       await run.wake?.();
@@ -62,7 +62,7 @@ export class Player {
     }
   }
 
-  /** Plays from the frame that is shown, or from the first one where that is the last. */
+  /** Plays from the present frame; from the first one, if the present one is the last. */
   async play() {
     const { page } = this;
     const { run, shown } = page;
@@ -72,13 +72,13 @@ export class Player {
     if (left.length === 0) return;
     const timeOf = (/** @type {number} */ frame) => run.frames.times.get(frame) ?? 0;
     const view = (this.view = page.view += 1);
-    // One that was paused may still wait, while another plays.
+    // An earlier call that was stopped may still wait while this one plays.
     const isOwn = () => this.isPlaying && view === this.view;
     this.tell();
     const begun = performance.now() - 1000 * timeOf(left[0]);
     for (const [at, frame] of left.entries()) {
       const next = left[at + 1];
-      // What is late is passed over, but the last one.
+      // Skips a frame whose successor is due already.
       if (next !== undefined && performance.now() - begun > 1000 * timeOf(next)) continue;
       const picture = await run.frames.at(frame).catch(() => undefined);
       const early = begun + 1000 * timeOf(frame) - performance.now();
@@ -97,7 +97,7 @@ export class Player {
     this.tell();
   }
 
-  /** Says what the button in the middle does. */
+  /** Sets the text of the button in the middle. */
   tell() {
     const { state } = this.page;
     const rests = state === "ended" && !this.isPlaying;

@@ -1,15 +1,16 @@
-// What is said to people when something fails.
+// The messages for users when something fails.
 
 import { Problem } from "./js/problem.js";
 
-/** What browsers say of a file that was chosen before differs. */
+/** One message for a chosen file that is gone: browsers report it by different errors. */
 const UNREADABLE = "The file cannot be read: it was moved, changed or removed.";
-/** Whether an error tells that.
+/** Whether an error means that a chosen file cannot be read any more.
  * @param {unknown} error */
 export const isUnreadable = (error) => error instanceof Error && WORDS[error.name] === UNREADABLE;
 export const GONE = new DOMException("", "NotReadableError");
 
-/** Whether a file that was chosen can still be read. Of one that was removed some browsers give a part without bytes.
+/** Whether a chosen file can still be read. In some browsers a removed file has size 0, and reading an empty slice of
+ * it succeeds: so then the file itself is read.
  * @param {Blob} file */
 export const isReadable = (file) => (file.size > 0 ? file.slice(0, 1) : file).arrayBuffer().then(() => true, () => false);
 
@@ -40,7 +41,7 @@ const WORDS = {
   EncodingError: "The rest of the file cannot be played. The results up to here can be saved.",
 };
 
-/** The browser cannot play a file, and the service may decode it. */
+/** The browser cannot play a file, but the service may be able to decode it. */
 export class UnplayableError extends Error {
   /** @param {File} file */
   constructor(file) {
@@ -57,7 +58,7 @@ export class UnplayableError extends Error {
 export function words(error, hasKey) {
   if (error instanceof Problem && error.slug === "unauthorized" && !hasKey) return "This service asks for an API key.";
   if (error instanceof Problem) return WORDS[error.slug] ?? error.message;
-  // Browsers have words of their own for a module that does not come, and some do not ask for it again.
+  // Browsers word a failed import differently, and some do not request the module again.
   if (error instanceof TypeError && /import/i.test(error.message)) return PART;
   if (error instanceof Error) return WORDS[error.name] ?? error.message;
   return String(error);

@@ -1,12 +1,12 @@
-// A project: the objects with their rows, and what is known of the video. It is a file that people keep, and what the
-// browser keeps of a page.
+// A project: the objects with their rows, and the name, size and rate of the video. Users save it as a file, and the
+// browser's database has it for each run.
 
 import { wake } from "./again.js";
 import { FollowedObject } from "./objects.js";
 import { openFiles } from "./sources.js";
 
 const STATUSES = ["tracking", "uncertain", "lost"];
-/** Bytes of a project file that tell that it is one. */
+/** Bytes at the beginning of a project file that contain its mark. */
 const HEAD = 100;
 const NOT_ONE = "This file is no project of this page: ";
 
@@ -25,7 +25,7 @@ export function projectOf(run) {
   return { bagtrack_project: 1, video, ended: run.isResting && !run.wake, skipped: run.skipped, objects };
 }
 
-/** The last state of each object.
+/** The last saved state of each object, by its number.
  * @param {Run} run */
 export const statesOf = (run) =>
   Object.fromEntries(run.objects.map(({ number, saves }) => [number, saves[saves.length - 1]]));
@@ -42,7 +42,7 @@ function rowOf([frame, time, x, y, width, height, score, status, isKey]) {
   return { frame, time, box: { x, y, width, height }, score, status, corrected: isKey === 1 };
 }
 
-/** Reads a project, and fails where it is none.
+/** Checks a document for being a project, and throws if it is none. Drops objects without rows.
  * @param {unknown} document
  * @returns {Project} */
 function readProject(document) {
@@ -59,8 +59,8 @@ function readProject(document) {
   return { ...project, objects: objects.filter(({ rows }) => rows.length > 0) };
 }
 
-/** The numbers of the objects, each once. One without a number has its place; one with that of another is counted on from
- * the highest.
+/** Unique numbers of the objects. An object without a number gets its index; one with an invalid number, or that of an
+ * earlier object, gets the next one after the highest.
  * @param {Project} project */
 function ownNumbers({ objects }) {
   const numbers = objects.map(({ number }, at) => Number(number ?? at));
@@ -69,7 +69,7 @@ function ownNumbers({ objects }) {
   return numbers.map((number, at) => (isOwn[at] ? number : (last += 1)));
 }
 
-/** Brings objects and rows into a run that has none.
+/** Adds the objects and rows of a project to a run without any.
  * @param {Run} run
  * @param {Project} project */
 function adopt(run, project) {
@@ -92,13 +92,13 @@ function adopt(run, project) {
   run.passedOver = project.skipped || 0;
 }
 
-/** Brings what was tracked into a run.
+/** Restores a project in a run that has just been opened.
  * @param {Keeping} keeping
  * @param {Run} run
  * @param {Project} project
  * @param {Kept["states"]} states
- * @param {string} [id] Its entry.
- * @returns {Promise<boolean>} Not where there is nothing: it waits for a first box. */
+ * @param {string} [id] The project's entry in the database.
+ * @returns {Promise<boolean>} False where the project has no objects: the run then waits for a first box. */
 export async function resume(keeping, run, project, states, id) {
   if (project.objects.length === 0) return false;
   // Another source was chosen while this module was loaded.
@@ -110,7 +110,7 @@ export async function resume(keeping, run, project, states, id) {
   run.picture = (last !== undefined && (await run.frames.at(last))) || run.picture;
   run.isResting = true;
   const { source } = run;
-  // Also where the video is not at hand: it may be chosen later.
+  // Set even if the video is not at hand: the user may choose it later.
   if (!project.ended) run.wake = () => wake(run, async () => source);
   const canGoOn = run.wake && source.goTo;
   if (run !== keeping.page.run) return true;
@@ -123,7 +123,7 @@ export async function resume(keeping, run, project, states, id) {
   return true;
 }
 
-/** A source for rows whose video is not at hand: its pictures are empty.
+/** A source for a project whose video is not at hand, with empty pictures.
  * @param {Project} project
  * @returns {Source} */
 export function withoutVideo({ video, objects }) {
@@ -146,7 +146,7 @@ export function withoutVideo({ video, objects }) {
   };
 }
 
-/** The project among files: others end with .json, too.
+/** The project among files. Other files may end with .json too, so the beginning of each is read.
  * @param {File[]} files */
 async function projectIn(files) {
   const named = files.filter(({ name }) => name.endsWith(".json"));
@@ -155,11 +155,11 @@ async function projectIn(files) {
   return named.find((_, at) => heads[at].includes('"bagtrack_project"'));
 }
 
-/** In what a source differs from the video of a project; nothing where it may be that.
+/** How a source differs from the video of a project; empty where it may be that video.
  * @param {Source} source
  * @param {Project} project */
 function unlike({ name, size, count = Infinity }, { video, objects }) {
-  // More rows than a call takes arguments.
+  // `Math.max` with a spread would fail: there may be more rows than a call can take arguments.
   const last = objects.flatMap(({ rows }) => rows).reduce((last, [frame]) => Math.max(last, frame), 0);
   if (size.width !== video.width || size.height !== video.height) {
     const other = `the video of this project (${video.name}) ${video.width} × ${video.height}`;
@@ -179,10 +179,10 @@ function fitting(source, project) {
   throw new Error(fault);
 }
 
-/** Takes a project file, alone or with its video, and the video of a project that was opened without, or is gone.
+/** Opens a project file, alone or with its video; or the video of a project that was opened without it, or lost it.
  * @param {Keeping} keeping
  * @param {File[]} files
- * @returns {Promise<boolean>} Whether it did. */
+ * @returns {Promise<boolean>} False where the files are neither. */
 export async function take(keeping, files) {
   const file = await projectIn(files);
   const { run } = keeping.page;
@@ -192,7 +192,8 @@ export async function take(keeping, files) {
   return true;
 }
 
-/** Takes the video of a project; opens another one for itself. One that is gone may have another name.
+/** Opens the video of the present project. Another video is opened as a new source. A video that had become unreadable
+ * may have another name by now: then its size and date tell that it is the same.
  * @param {Keeping} keeping
  * @param {Run} run
  * @param {File[]} files */
@@ -216,11 +217,11 @@ async function takeVideo(keeping, run, files) {
 /**
  * @param {Keeping} keeping
  * @param {File} file
- * @param {File[]} files Of its video. */
+ * @param {File[]} files The project's video; may be empty. */
 async function openProject(keeping, file, files) {
   /** @type {Project} */
   let project;
-  // Reads it as a source is opened: a choice that overtakes it says what is said.
+  // Reads the project within `open`, so that after a later choice, no error of this one is shown.
   const open = async () => {
     const read = new Response(await file.text()).json();
     project = readProject(await read.catch(() => Promise.reject(new Error(`${file.name} is no JSON.`))));

@@ -1,4 +1,4 @@
-// The video with its boxes, made from the frames that were tracked: each is in it once, at its time.
+// Makes a video of the tracked frames with the boxes painted in: each frame once, at its time.
 
 import { shownIn } from "./boxes.js";
 import { close } from "./frames.js";
@@ -6,21 +6,21 @@ import { matroska } from "./matroska.js";
 import { encoded } from "./source.js";
 import { paintBox } from "./stage.js";
 
-/** Of these the one that the browser encodes faster: they differ by ten times, here one way and there the other. */
+/** The codecs, one of which a trial chooses: in some browsers one is ten times as fast, in others the other one. */
 const CODECS = /** @type {const} */ ([
   ["vp8", "V_VP8"],
   ["vp09.00.40.08", "V_VP9"],
 ]);
-/** Frames that tell which. */
+/** Frames that the trial encodes with each codec. */
 const TRIED = 4;
 const BITS_A_PIXEL = 0.1;
-/** So often there is a key frame, which a player can go to. */
+/** Frames from one key frame to the next; players can seek to key frames only. */
 const KEY_EVERY = 30;
-/** Frames that wait for the encoder at a time. */
+/** Most frames in the encoder's queue. */
 const MOST_WAITING = 8;
 const QUALITY = 0.9;
 
-/** Whether the browser encodes video. Over plain HTTP none does; then the frames stay JPEGs, in a Matroska file. */
+/** Whether pages have `VideoEncoder`. Over plain HTTP none has; then the frames stay JPEGs, in a Matroska file. */
 export const encodes = typeof VideoEncoder !== "undefined";
 export const extension = encodes ? "webm" : "mkv";
 
@@ -59,7 +59,7 @@ async function makeJpegs(run, canvas, tell) {
   return { codec: "V_MJPEG", chunks };
 }
 
-/** An encoder, and what it has encoded. */
+/** An encoder, with the chunks that it has encoded. */
 class Encoder {
   /** @param {VideoEncoderConfig} config */
   constructor(config) {
@@ -100,7 +100,7 @@ class Encoder {
   }
 }
 
-/** The codec that the browser encodes a picture with first.
+/** The codec that finishes a trial first.
  * @param {HTMLCanvasElement} canvas
  * @param {VideoEncoderConfig} config */
 async function quickest(canvas, config) {

@@ -1,4 +1,4 @@
-// One run: a source of frames, the objects that are followed through them, and the answers.
+// One run: a source of frames, the objects that are followed through them, and the tracker's answers.
 
 import { rowOf } from "./boxes.js";
 import { sendDrawn } from "./drawn.js";
@@ -10,22 +10,22 @@ import { isUnreadable } from "./problems.js";
 
 export class Run {
   /**
-   * @param {Client | LocalClient} client Where it is tracked.
+   * @param {Client | LocalClient} client Tracks at the service, or in the page.
    * @param {Source} source
-   * @param {Picture} picture The first one.
+   * @param {Picture} picture The first frame of the source.
    * @param {RunTold} told
    */
   constructor(client, source, picture, told) {
     this.client = client;
     this.source = source;
     this.told = told;
-    /** The picture that was answered last. */
+    /** The last picture with an answer; the first one before that. */
     this.picture = picture;
     /** @type {FollowedObject[]} */
     this.objects = [];
-    /** @type {FollowedObject | undefined} The chosen one. */
+    /** @type {FollowedObject | undefined} The object that corrections go to. */
     this.chosen = undefined;
-    /** How many there were. */
+    /** How many objects there were, deleted ones included. */
     this.count = 0;
     this.frames = new Frames(source);
     this.frames.failed = (error) => this.lose(error);
@@ -38,19 +38,19 @@ export class Run {
     this.isOver = false;
     this.isResting = false;
     this.hasAll = false;
-    /** @type {unknown} What keeps the source from giving more frames. */
+    /** @type {unknown} The error that ended the source. */
     this.failure = undefined;
     /** @type {{picture: Picture, at: number}[]} Frames without an answer, oldest first. */
     this.underWay = [];
     /** @type {import("./drawn.js").Drawn | undefined} */
     this.drawn = undefined;
-    /** @type {(() => Promise<void>) | undefined} Goes on with a run that was brought back, or stopped. */
+    /** @type {(() => Promise<void>) | undefined} Goes on with a run that was stopped, or restored from the database. */
     this.wake = undefined;
     /** Whether earlier frames are tracked anew. */
     this.isRedoing = false;
   }
 
-  /** Whether its files are gone or were changed: they are to be chosen again. */
+  /** Whether the files of the source are gone or changed, so that the user must choose them again. */
   get isGone() {
     return isUnreadable(this.failure);
   }
@@ -76,7 +76,7 @@ export class Run {
     if (!this.isResting) this.play();
   }
 
-  /** Takes the frames after the last one. */
+  /** Starts the source, after the last frame. */
   play() {
     this.isResting = false;
     sendDrawn(this);
@@ -92,7 +92,7 @@ export class Run {
     });
   }
 
-  /** Follows another object, from the picture that was answered last.
+  /** Follows another object, from `picture` on.
    * @param {Box} box */
   async add(box) {
     const { picture } = this;
@@ -137,7 +137,7 @@ export class Run {
     this.throttle();
   }
 
-  /** Whether there is nothing to follow: frames wait for a box. Those of a camera do not, one draws in what it sees. */
+  /** Whether frames wait because there is no object. Those of a camera never do: the user draws in the live picture. */
   get wantsObject() {
     return this.objects.length === 0 && !this.source.isLive;
   }
@@ -156,9 +156,9 @@ export class Run {
     try {
       const answers = await Promise.all(objects.map((it) => it.follower.track(picture, { see: see(it) })));
       this.underWay = this.underWay.filter((other) => other !== sent);
-      // It was on its way when the sessions were ended, and comes again where one goes on.
+      // The sessions ended before this frame was answered. The source delivers it again when the run goes on.
       if (this.isResting && answers.some((answer) => !answer)) return close(picture);
-      // Those on their way when the last object is deleted are before the next box.
+      // Frames that were in flight when the last object was deleted are no skipped ones: the next box is after them.
       const isSkipped = objects.length > 0 && !this.wantsObject && answers.every((answer) => !answer);
       if (isSkipped) {
         this.skip(picture);
@@ -197,7 +197,7 @@ export class Run {
       if (answer && this.objects.includes(object)) this.note(object, answer, picture, false);
     });
     this.told.answer(picture, this.chosen && answers[objects.indexOf(this.chosen)]);
-    // It is not shown any more.
+    // The picture before is not on the screen any more.
     if (before.image !== picture.image) close(before);
     sendDrawn(this);
     this.checkEnd();
@@ -219,20 +219,20 @@ export class Run {
     this.throttle();
   }
 
-  /** The user drew a box in the picture that is shown: for an object, or for a new one.
+  /** Takes a box that the user drew in the last picture.
    * @param {Box} box
    * @param {FollowedObject | undefined} object
-   * @param {() => void} sending Is told as it is sent.
-   * @param {() => void} refused Is told where the tracker does not take it. */
+   * @param {() => void} sending Called right before the box is sent.
+   * @param {() => void} refused Called if the tracker refuses the box. */
   draw(box, object, sending, refused) {
     this.drawn = { box, object, sending, refused };
     sendDrawn(this);
   }
 
-  /** Tracks frames again while no other ones are tracked.
+  /** Runs `track` once all frames in flight are answered; no other frame is sent until it ends.
    * @param {() => Promise<void>} track */
   async alone(track) {
-    // One may go on while a box is still followed that was drawn before.
+    // Another call, for a box that was drawn before, may still be at work.
     while (this.isRedoing) await new Promise(requestAnimationFrame);
     this.isRedoing = true;
     this.throttle();
@@ -255,14 +255,14 @@ export class Run {
     else if (this.failure) this.end();
   }
 
-  /** The source has no more frames that can be had: those before are kept. */
+  /** The source has failed: the run ends, and its rows are kept. */
   end() {
     this.rest();
     if (this.source.isFetched || this.isGone) this.told.rest(this.failure);
     else this.told.fail(this.failure);
   }
 
-  /** The picture of an earlier frame cannot be had. A file that is gone has no more frames, either.
+  /** An earlier frame cannot be read again. If the file is gone, that ends the run too.
    * @param {unknown} error */
   lose(error) {
     if (this.isOver || !isUnreadable(error)) return;
@@ -286,14 +286,14 @@ export class Run {
     this.source.close?.();
   }
 
-  /** Takes no more frames. Those that are kept can be tracked anew, and the sessions be handed over. */
+  /** Takes no more frames. Earlier frames can still be tracked again, and objects be handed over. */
   rest() {
     this.isResting = true;
     this.source.stop();
     this.leaveSessions();
   }
 
-  /** Ends the service's sessions of a run that takes no more frames. One that goes on opens others. */
+  /** Ends the sessions at the service if the run takes no more frames. If it goes on, it opens others. */
   leaveSessions() {
     if (this.isResting && !this.isLocal) this.objects.forEach(({ follower }) => follower.end());
   }

@@ -1,21 +1,21 @@
-// Saving results: one function a format. Pixels are the video's own, from 0 (in MOT from 1); YOLO and Label Studio have
-// shares of the picture.
+// Saving results: one function for each format. Boxes are in pixels of the video, from 0 (in MOT from 1); in YOLO as
+// shares of its size, in Label Studio in percent.
 
 import { projectOf } from "./project.js";
 import { zip } from "./zip.js";
 
-/** What is said of a video. In a CSV it stands in every row, so that spreadsheets and programs read the table as it is.
+/** The name, size and rate of the video. A CSV repeats them in every row, so that it stays a plain table.
  * @param {Run} run */
 function about({ source }) {
   const rate = source.rate && Number(source.rate.toFixed(3));
   return { video: source.name, video_width: source.size.width, video_height: source.size.height, frame_rate: rate };
 }
 
-/** What an object is called, also where its name was deleted.
+/** The name of an object; its number where the user has emptied the name.
  * @param {FollowedObject} object */
 const nameOf = ({ name, number }) => name.trim() || `Object ${number + 1}`;
 
-/** The classes of objects: those of one name are one.
+/** The classes of objects: their names, each once.
  * @param {Run} run */
 const classesOf = ({ objects }) => [...new Set(objects.map(nameOf))];
 
@@ -55,7 +55,7 @@ function plain(run) {
   return json({ video, ...size, skipped: run.skipped, boxes: flat(run) });
 }
 
-/** The MOTChallenge: frames, objects and pixels count from 1; the last three are a place in the world.
+/** MOTChallenge: frames, objects and pixels count from 1; the last three fields, a position in the world, are unknown.
  * @param {Run} run */
 function mot(run) {
   const lines = flat(run).map(({ frame, target, x, y, width, height, score }) => {
@@ -65,7 +65,7 @@ function mot(run) {
   return new Blob([`${lines.join("\n")}\n`], { type: "text/plain" });
 }
 
-/** The part of a box that is in the video; nothing where there is none, or where the object is lost.
+/** The part of a box inside the picture; undefined where that is empty, or the object is lost.
  * @param {Run} run
  * @param {ReturnType<typeof flat>[number]} row */
 function inside({ source: { size } }, { x, y, width, height, status }) {
@@ -79,12 +79,12 @@ function inside({ source: { size } }, { x, y, width, height, status }) {
  * @param {Run} run */
 const tracked = (run) => [...new Set(flat(run).map(({ frame }) => frame))];
 
-/** How the picture of a frame is called: as its file, or by its number.
+/** The file name of a frame's picture: that of the image, or one made of the frame's number.
  * @param {Run} run
  * @param {number} frame */
 const imageName = ({ source }, frame) => source.imageNames?.[frame] ?? `frame_${String(frame).padStart(6, "0")}.jpg`;
 
-/** COCO, with the `track_id` and `video_id` of its kin for videos. Lost objects are left out.
+/** COCO, with `track_id` and `video_id`, as in its variants for videos. Lost objects are left out.
  * @param {Run} run */
 function coco(run) {
   const { video, video_width: width, video_height: height } = about(run);
@@ -105,7 +105,7 @@ function coco(run) {
   return json({ info, licenses: [], videos: [{ id: 1, name: video }], images, annotations: numbered, categories });
 }
 
-/** YOLO: a text for each frame, with the centre and the size of each box as shares of the picture. Lost ones are left out.
+/** YOLO: a text file for each frame, with the centre and size of each box as shares of the picture. No lost ones.
  * @param {Run} run */
 function yolo(run) {
   const { width, height } = run.source.size;
@@ -136,12 +136,12 @@ function goesOn({ hasAll, source }, { time }) {
   return !hasAll && source.duration !== undefined && time + 1.5 * interval < source.duration;
 }
 
-/** XML has no control characters, and names of files may.
+/** Escapes text for XML, and replaces control characters, which names of files may have and XML may not.
  * @param {string} text */
 const escaped = (text) =>
   text.replace(/[\0-\x1f\x7f-\x9f\ufffe\uffff]/g, "\ufffd").replace(/[<>&"]/g, (sign) => `&#${sign.charCodeAt(0)};`);
 
-/** A box of CVAT, which draws what lies between key frames, so each frame is one.
+/** A box of CVAT. Each frame is a key frame, since CVAT interpolates between them.
  * @param {Row} row
  * @param {number} frame
  * @param {boolean} isOutside */
@@ -151,8 +151,8 @@ function keyFrame({ box }, frame, isOutside) {
   return `<box frame="${frame}" outside="${isOutside ? 1 : 0}" occluded="0" keyframe="1" ${sides} z_order="0"></box>`;
 }
 
-/** CVAT for video 1.1: a track for each object. It is shown until a box is outside: where the object is lost, and after
- * its last row where the video goes on.
+/** CVAT for video 1.1: a track for each object. CVAT shows a track until a box with `outside`: here, where the object
+ * is lost, and after its last row if the video goes on.
  * @param {Run} run */
 function cvat(run) {
   const { video, video_width: width, video_height: height } = about(run);
@@ -178,8 +178,8 @@ ${tracks.join("\n")}
   return new Blob([document], { type: "application/xml" });
 }
 
-/** The key frames of an object for Label Studio. One that is not enabled is shown itself, and nothing after it: so it
- * is the last before the object is lost; or the first in which it is, where there is no row of the frame before.
+/** The key frames of an object for Label Studio, which shows a key frame with `enabled` false, and nothing after it.
+ * That is the last one before the object is lost; or the first lost one, if the frame right before that has no row.
  * @param {Run} run
  * @param {Map<number, Row>} rows */
 function sequenceOf(run, rows) {

@@ -1,4 +1,5 @@
-// The buttons that save results. What makes the files is loaded when a source is open, and needs no service later.
+// The buttons that save results. The modules that make the files load when a source opens, so that saving works even if
+// the service has gone since.
 
 import { button, get } from "./dom.js";
 import { words } from "./problems.js";
@@ -10,7 +11,7 @@ export function offerSaving(page) {
   get("results").addEventListener("click", async ({ target }) => {
     const format = target instanceof HTMLElement ? target.closest("button")?.id.replace("save-", "") : undefined;
     if (!format || !page.run) return;
-    // The listeners of the two other buttons leave that to this one.
+    // Says so for "Hand over" and "Video" too: their own listeners return silently.
     if (page.run.objects.length === 0) return page.say("There is no object to save.");
     try {
       const [{ FORMATS, save }] = await modules();
@@ -28,7 +29,7 @@ export function offerSaving(page) {
   get("no-encoder").hidden = typeof VideoEncoder !== "undefined";
 }
 
-/** Loads what makes the files of a new run, while there is a line to the service. */
+/** Loads the modules that make files, while the service can be reached. */
 export function prepareSaving() {
   restore();
   button("hand-over").disabled = false;
@@ -47,7 +48,7 @@ async function saveVideo(page) {
   if (run.source.isAbsent) return page.say(`A video cannot be made without pictures. Choose ${run.source.name} first.`, true);
   const own = button("save-video");
   own.disabled = true;
-  // Another run may have taken its place.
+  // The user may open another source while the video is made.
   const isHere = () => run === page.run;
   const tell = (/** @type {number} */ done, /** @type {number} */ of) => {
     if (isHere()) own.textContent = `Making the video: ${Math.floor((100 * done) / of)} %`;

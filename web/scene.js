@@ -4,10 +4,10 @@
 
 export const WIDTH = 640;
 export const HEIGHT = 360;
-/** After so many frames it begins again. */
+/** Frames until the clip repeats. */
 export const FRAMES = 240;
 const ROAD = 292;
-/** Hills from far to near: height, roughness, colour above and below, how often they go by in a round. */
+/** Hills from far to near: y of the base, height of the waves, upper and lower colour, passes in `FRAMES` frames. */
 const HILLS = /** @type {const} */ ([
   [168, 20, "#6a5a86", "#8f6d8c", 1],
   [206, 24, "#453f6b", "#6b4f78", 2],
@@ -80,7 +80,7 @@ function drawRoad(context, round) {
  * @param {number} x
  * @param {number} y
  * @param {number} size
- * @param {number} turn Of the wheels. */
+ * @param {number} turn Angle of the wheels in radians. */
 function drawVan(context, x, y, size, turn) {
   context.save();
   context.translate(x, y);

@@ -1,17 +1,17 @@
-// A closer look at the place around the target, with what the tracker compared there.
+// A close-up of the place around the target, with the particles that the tracker compared there.
 
 import { colorOf, paintParticles, shareOf } from "./particles.js";
 
-/** So many of the likeliest ones are shown as boxes. */
+/** How many of the likeliest particles are shown as boxes. */
 const BOXES = 24;
-/** The closer look is so many times as wide as the box, at least and at most. */
+/** The least and largest width of the close-up, in multiples of the longer side of the box. */
 const [LEAST, MOST] = [1.7, 5];
-/** The share of the particles that it has in it. */
+/** The share of the particles that are inside the close-up. */
 const INSIDE = 0.7;
-/** How quickly it moves, grows and shrinks. */
+/** The share of the way to its new place and size that the close-up goes in each frame. */
 const EASE = 0.15;
 
-/** The value that this share of the values is not over.
+/** The quantile of the values at this share.
  * @param {number[]} values
  * @param {number} share */
 const inner = (values, share) => [...values].sort((one, other) => one - other)[Math.floor(share * values.length)] ?? 0;
@@ -21,9 +21,9 @@ export class Search {
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     this.canvas = canvas;
-    /** How many times as wide as the box it is. */
+    /** The width of the close-up, in multiples of the longer side of the box. */
     this.wide = LEAST;
-    /** From the middle of the box to its own. */
+    /** From the middle of the box to that of the close-up, in pixels. */
     this.off = [0, 0];
   }
 
@@ -41,7 +41,7 @@ export class Search {
     if (!context || width === 0) return;
     const middle = [box.x + box.width / 2, box.y + box.height / 2];
     const longest = Math.max(box.width, box.height);
-    // A lost target is looked for elsewhere.
+    // Follows the particles rather than the box: the tracker searches for a lost target elsewhere.
     this.off = this.off.map((off, side) => off + EASE * (inner(particles.map((it) => it[side] - middle[side]), 0.5) - off));
     const [x, y] = middle.map((value, side) => value + this.off[side]);
     const far = particles.map(([left, top]) => Math.max(Math.abs(left - x), Math.abs(top - y)));
@@ -60,7 +60,7 @@ export class Search {
     context.strokeRect(box.x, box.y, box.width, box.height);
   }
 
-  /** The likeliest particles as boxes, as high for their width as the target's.
+  /** Paints the likeliest particles as boxes with the aspect ratio of the target's.
    * @param {CanvasRenderingContext2D} context
    * @param {Box} box
    * @param {number[][]} particles

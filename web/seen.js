@@ -1,14 +1,14 @@
-// What the tracker sees beside the picture: where it searches, the target as given and as found, the bag with its votes,
-// the figures.
+// The panel beside the picture: where the tracker searches, the target as drawn and as found, the bag with its votes,
+// and the figures.
 
 import { scaled } from "./boxes.js";
 import { canvas, get, input } from "./dom.js";
 import { close } from "./frames.js";
 import { copyPatch } from "./stage.js";
 
-/** From this width of the window on there is room beside the picture. */
+/** The least width of the window with room beside the picture: there the panel is on at first. */
 const ROOM = matchMedia("(min-width: 64rem)");
-/** Milliseconds after which the bag is shown again. */
+/** Milliseconds from one picture of the bag to the next. */
 const BAG_EVERY = 1000;
 
 export class Seen {
@@ -18,7 +18,7 @@ export class Seen {
     this.hasShown = false;
     this.bagShownAt = 0;
     this.bagSize = 0;
-    /** @type {FollowedObject | undefined} The one that is shown. */
+    /** @type {FollowedObject | undefined} The object in the panel. */
     this.shown = undefined;
     input("see").checked = ROOM.matches;
     this.fit();
@@ -28,7 +28,7 @@ export class Seen {
     return input("see").checked;
   }
 
-  /** Loads what draws it: the first screen does not need it. */
+  /** Imports the modules that draw the panel: the first screen does without. */
   async prepare() {
     const [{ Search }, { Votes }] = await Promise.all([import("./search.js"), import("./votes.js")]);
     this.views ??= { search: new Search(canvas("search")), votes: new Votes(canvas("votes"), canvas("bag")) };
@@ -82,7 +82,7 @@ export class Seen {
     if (status !== "lost") copyPatch(canvas("patch"), image, box);
   }
 
-  /** Shows an object as it was given.
+  /** Shows an object as it was drawn first.
    * @param {Run} run
    * @param {FollowedObject} object */
   async given(run, object) {
@@ -95,7 +95,7 @@ export class Seen {
     close(picture);
   }
 
-  /** Shows the bag of an object, now and then and when it grows.
+  /** Shows the bag of an object, every `BAG_EVERY` and when its size changes.
    * @param {FollowedObject} object
    * @param {number} size */
   async bag(object, size) {
@@ -103,7 +103,7 @@ export class Seen {
     if (now - this.bagShownAt < BAG_EVERY && size === this.bagSize) return;
     this.bagShownAt = now;
     this.bagSize = size;
-    // The session may end meanwhile; then the last picture stays.
+    // The session may end during the request; then the last picture of the bag stays.
     const blob = await object.follower.bag().catch(() => undefined);
     if (blob && object === this.shown) await this.views?.votes.take(blob);
   }

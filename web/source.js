@@ -1,10 +1,10 @@
-// How a frame of a video element becomes a picture.
+// Turns the frame that a video element shows into a picture for the tracker.
 
 const QUALITY = 0.85;
 /** Longest side of an uploaded frame in pixels: the tracker needs no more. */
 export const LONGEST_SIDE = 960;
 
-/** A video element at a place of the page: what browsers do not show they may not decode.
+/** Adds a video element to the page: browsers may not decode one that is not in it.
  * @param {HTMLElement} place */
 export function addVideo(place) {
   const video = document.createElement("video");
@@ -26,14 +26,14 @@ export function loaded(video) {
   });
 }
 
-/** Draws what a video shows, as large as it is uploaded.
+/** Draws the present frame of a video, scaled down to `LONGEST_SIDE`.
  * @param {HTMLVideoElement} video
- * @param {HTMLCanvasElement} [canvas] Where to, if not onto a new one. */
+ * @param {HTMLCanvasElement} [canvas] Where to draw; a new one by default. */
 export function drawFrame(video, canvas = document.createElement("canvas")) {
   return drawScaled(video, { width: video.videoWidth, height: video.videoHeight }, canvas);
 }
 
-/** Draws an image as large as it is uploaded.
+/** Draws an image, scaled down to `LONGEST_SIDE`.
  * @param {CanvasImageSource} image
  * @param {Size} size As it is shown.
  * @param {HTMLCanvasElement} [canvas]
@@ -52,7 +52,7 @@ export function drawScaled(image, size, canvas = document.createElement("canvas"
   return canvas;
 }
 
-/** The file that a canvas is uploaded as.
+/** Encodes a canvas as JPEG, for the upload.
  * @param {HTMLCanvasElement} canvas
  * @param {number} [quality]
  * @returns {Promise<Blob>} */

@@ -1,15 +1,15 @@
-// What one opens: buttons, files that are chosen, dropped or pasted, folders.
+// Opening sources: by buttons, and by files or folders that are chosen, dropped or pasted.
 
 import { button, get, input } from "./dom.js";
 import { GONE, UnplayableError, isReadable } from "./problems.js";
 
-/** What opens sources is loaded when one is about to choose. */
+/** The modules that open sources, imported when the user is about to choose one. */
 const modules = () =>
   Promise.all([import("./video.js"), import("./images.js"), import("./camera.js"), import("./clip.js")]);
 
-/** Opens what files are: one video, or images. Of several videos the first.
+/** Opens files as a source: one video, or images. Of several videos, the first.
  * @param {File[]} files
- * @param {string[]} [names] Of images that have been opened before.
+ * @param {string[]} [names] The paths of images that were opened before.
  * @returns {Promise<Source>} */
 export async function openFiles(files, names) {
   const [{ openVideo }, { isImage, openAnimated, openImages }] = await modules();
@@ -29,16 +29,16 @@ export async function openFiles(files, names) {
   return source;
 }
 
-/** Whether a file is by its kind of no use to a decoder. Some systems take an MPEG transport stream for a text.
+/** Whether the type of a file says that it is no video. Some systems give MPEG transport streams the type of a text.
  * @param {File} file */
 const isNoVideo = ({ name, type }) =>
   /^(text|font)\/|^application\/(json|pdf|xml|zip|javascript|vnd\.)/.test(type) && !/\.m?2?ts$/i.test(name);
 
-/** All files of what was dropped, those in folders too.
+/** All files of a drop, with those in folders.
  * @param {DataTransfer} dropped */
 async function filesOf(dropped) {
   const entries = [...dropped.items].map((item) => item.webkitGetAsEntry?.()).filter((entry) => !!entry);
-  // A drop has no entries where a program made it.
+  // A drop that a script made has no entries.
   if (!entries.some(({ isDirectory }) => isDirectory)) return [...dropped.files];
   return (await Promise.all(entries.map(filesIn))).flat();
 }
@@ -61,13 +61,13 @@ async function filesIn(entry) {
   }
 }
 
-/** Offers to have a file decoded by the service: it is uploaded for that.
+/** Offers to upload a file to the service, which decodes it.
  * @param {Page} page
  * @param {File} file
  * @param {import("./opening.js").Resume} [resume] */
 export function offerDecoding(page, file, resume) {
   get("decoding").hidden = false;
-  // What is said may be of another video by now.
+  // The button names the file: the message line may be about another one by then.
   button("decode").textContent = `Let the service decode ${file.name}`;
   button("decode").onclick = () => {
     const open = async (/** @type {AbortSignal} */ signal) => {
@@ -84,7 +84,7 @@ export function offerDecoding(page, file, resume) {
 
 /**
  * @param {(open: () => Promise<Source>) => void} choose
- * @param {(files: File[]) => Promise<boolean>} take Takes files that are no frames, and says whether it did.
+ * @param {(files: File[]) => Promise<boolean>} take Takes a project's files; resolves with false for others.
  */
 export function offerSources(choose, take) {
   const open = async (/** @type {File[]} */ files) => {
@@ -110,12 +110,12 @@ export function offerSources(choose, take) {
       input(id).value = "";
     };
     input(id).addEventListener("change", chosen);
-    // Over a slow line one may have chosen before.
+    // Over a slow connection, the user may have chosen a file before this script ran.
     chosen();
   }
   for (const kind of ["dragover", "dragleave", "drop"]) {
     addEventListener(kind, async (event) => {
-      // Without this the browser leaves the page for the file.
+      // Otherwise the browser would leave the page, and show the file.
       event.preventDefault();
       document.body.classList.toggle("drop", kind === "dragover");
       const { dataTransfer } = /** @type {DragEvent} */ (event);

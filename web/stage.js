@@ -1,4 +1,4 @@
-// The picture, and over it what is known of it: boxes and particles, as sharp as the screen is.
+// The picture, and an overlay at the resolution of the screen with boxes and particles.
 
 import { paintParticles } from "./particles.js";
 
@@ -11,14 +11,14 @@ import { paintParticles } from "./particles.js";
  * @property {boolean} isChosen
  */
 
-/** Of a box that is being drawn. */
+/** The colour of a box that is being drawn. */
 const DRAWN = "#ffffff";
 const DARK = "#0b0c0f";
-/** What is outside of it. */
+/** The colour over the picture outside of that box. */
 const OUTSIDE = "#0b0c0f73";
-/** Pixels of the screen in the width of a picture that is not on a screen. */
+/** The assumed width on a screen of a picture that is not shown, in pixels. */
 const USUAL_WIDTH = 640;
-/** Of a name in the picture. The list has the whole of it. */
+/** Most letters of a name in the picture. The list shows the whole name. */
 const MOST_LETTERS = 24;
 
 export class Stage {
@@ -39,7 +39,7 @@ export class Stage {
     this.particles = [];
     /** @type {Box | undefined} The box that is being drawn. */
     this.drawn = undefined;
-    /** Pixels of the video in one of the picture. */
+    /** Pixels of the video for one pixel of the picture. */
     this.scale = 1;
     new ResizeObserver(() => this.paint()).observe(overlay);
   }
@@ -63,14 +63,14 @@ export class Stage {
   }
 
   /** @param {Box | undefined} drawn
-   * @param {number} [width] Of the video, in its own pixels. */
+   * @param {number} [width] The width of the video in pixels. */
   draw(drawn, width = this.canvas.width) {
     this.drawn = drawn;
     this.scale = width / this.canvas.width;
     this.paint();
   }
 
-  /** Paints what is over the picture, in the picture's coordinates. */
+  /** Paints the overlay, in the coordinates of the picture. */
   paint() {
     const { canvas, over, overlay } = this;
     if (!this.image || overlay.clientWidth === 0) return;
@@ -85,7 +85,7 @@ export class Stage {
     for (const object of this.objects) paintBox(over, object, unit);
   }
 
-  /** The box that is being drawn; the rest is darker.
+  /** Paints the box that is being drawn, and darkens the rest.
    * @param {Box} box
    * @param {number} unit */
   paintDrawn(box, unit) {
@@ -100,7 +100,7 @@ export class Stage {
   }
 }
 
-/** Copies what is in a box of an image, into a square canvas.
+/** Copies the part of an image inside a box to a square canvas.
  * @param {HTMLCanvasElement} target
  * @param {ImageBitmap | HTMLCanvasElement} image
  * @param {Box} box */
@@ -137,7 +137,7 @@ export function paintBox(context, { box, color, name, isLost, isChosen }, unit =
  * @param {string} name
  * @param {number} x
  * @param {number} y
- * @param {string[]} colors Of the ground and of the text.
+ * @param {string[]} colors The colours of the background and of the text.
  * @param {number} unit */
 function paintName(context, name, x, y, [ground, text], unit) {
   const letters = [...name];

@@ -1,6 +1,6 @@
-// Frames of which any can be had at any time: those of a sample clip, a folder of images, a decoded file.
+// A source with random access to its frames: a sample clip, a folder of images, a decoded file.
 
-/** Frames that are loaded ahead. */
+/** Frames that are loaded in advance. */
 const AHEAD = 12;
 
 /** @implements {Source} */
@@ -8,7 +8,7 @@ export class Stills {
   /**
    * @param {string} name
    * @param {number} rate Frames a second.
-   * @param {(index: number) => Promise<Blob>} [load] For frames that are files of their own.
+   * @param {(index: number) => Promise<Blob>} [load] Loads the image file of a frame.
    */
   constructor(name, rate, load = async () => new Blob()) {
     this.name = name;
@@ -17,27 +17,27 @@ export class Stills {
     /** @type {number} */
     this.rate = rate;
     this.load = load;
-    /** @type {number[] | undefined} In seconds, ascending, where they are not those of the rate. */
+    /** @type {number[] | undefined} Times of the frames in seconds, ascending; undefined where the rate gives them. */
     this.times = undefined;
     this.skipped = 0;
-    /** How many there are. */
+    /** The number of frames. */
     this.count = 0;
     /** @type {Map<number, Promise<Picture | undefined>>} */
     this.loaded = new Map();
-    /** The one that was delivered last. */
+    /** The frame that was delivered last. */
     this.index = 0;
     this.isFetched = false;
     /** Whether frames come at their rate. Else they come as fast as they can be tracked, in a hidden tab too. */
     this.isPaced = false;
     this.isHeld = false;
-    /** Is not held any more. */
+    /** Wakes `start` when `hold` ends. */
     this.released = () => {};
     this.isStopped = false;
-    /** @type {File[] | undefined} Where they are files of this machine. */
+    /** @type {File[] | undefined} The user's files, where the frames come from such. */
     this.files = undefined;
-    /** @type {string | undefined} What is to be said once it is open. */
+    /** @type {string | undefined} A sentence for the message when the source is open. */
     this.note = undefined;
-    /** @type {string[] | undefined} How they are called, where each is a file. */
+    /** @type {string[] | undefined} The path of each frame, where each is a file. */
     this.imageNames = undefined;
     /** @type {(() => void) | undefined} */
     this.close = undefined;
@@ -59,7 +59,7 @@ export class Stills {
   /** @param {number} time */
   goTo(time) {
     let index = Math.min(Math.max(0, this.count - 1), Math.round(time * this.rate));
-    // The rate may be that of the mean. The nearest in time is not far.
+    // The rate may be a mean, so search for the nearest frame around the estimate.
     const distance = (/** @type {number} */ at) => Math.abs(this.timeOf(at) - time);
     while (index > 0 && distance(index - 1) < distance(index)) index -= 1;
     while (index + 1 < this.count && distance(index + 1) < distance(index)) index += 1;
@@ -72,7 +72,7 @@ export class Stills {
     return undamaged(await this.picture(index));
   }
 
-  /** One of them; nothing where it is damaged, and those after it can be had.
+  /** A frame; undefined where it is damaged, but later ones can be read.
    * @param {number} index
    * @returns {Promise<Picture | undefined>} */
   async picture(index) {
@@ -85,7 +85,7 @@ export class Stills {
     const known = this.loaded.get(index);
     if (known) return known;
     const loading = this.picture(index);
-    // Whoever waits for it is told.
+    // The caller that awaits `loading` gets the error.
     loading.catch(() => undefined);
     this.loaded.set(index, loading);
     return loading;

@@ -3,17 +3,17 @@
 const STATUSES = /** @type {const} */ (["tracking", "uncertain", "lost"]);
 /** @type {Record<string, number>} */
 const STEPS = { ArrowLeft: -1, ArrowRight: 1, PageUp: -10, PageDown: 10, Home: -Infinity, End: Infinity };
-/** Pixels over the curve for the number of a frame, and under it for those of the ruler. */
+/** Pixels above the curve for the number of a frame, and below it for the numbers of the ruler. */
 const [TOP, BOTTOM] = [22, 18];
-/** Least pixels between two numbers of the ruler, and the steps that they may have. */
+/** Least pixels between two numbers of the ruler, and the possible steps between them. */
 const APART = 56;
 const RULER = [1, 2, 5, 10, 25, 50, 100, 250, 500, 1000, 2500, 5000, 10000];
 
 export class Timeline {
   /**
    * @param {HTMLCanvasElement} canvas
-   * @param {(frame: number) => void} seek Is told which frame shall be shown.
-   * @param {(by: number) => void} step Is told how many frames before or after it.
+   * @param {(frame: number) => void} seek Shows a frame.
+   * @param {(by: number) => void} step Shows a frame so many before or after the present one.
    */
   constructor(canvas, seek, step) {
     this.canvas = canvas;
@@ -23,7 +23,7 @@ export class Timeline {
     this.rows = [];
     this.last = 0;
     this.shown = 0;
-    /** The frame at its right end. */
+    /** The frame at the right end. */
     this.end = 0;
     /** @type {number | undefined} The frame under the mouse. */
     this.hovered = undefined;
@@ -70,13 +70,13 @@ export class Timeline {
    * @param {Row[]} rows Of the chosen object.
    * @param {number} last The last frame that was tracked.
    * @param {number} shown
-   * @param {number} end Where it ends, unless more frames were tracked. */
+   * @param {number} end The frame at the right end; at least `last`. */
   show(rows, last, shown, end) {
     Object.assign(this, { rows, last, shown, end: Math.max(last, end, 1) });
     this.repaint();
   }
 
-  /** Paints at most once for each frame of the screen. */
+  /** Paints at most once for each refresh of the screen. */
   repaint() {
     if (this.isDue) return;
     this.isDue = true;
@@ -117,14 +117,14 @@ export class Timeline {
   }
 }
 
-/** What is drawn of a timeline, in pixels of the screen. */
+/** The drawing of a timeline, in CSS pixels. */
 class Sheet {
   /**
    * @param {CanvasRenderingContext2D} context
    * @param {number} width
    * @param {number} height
-   * @param {number} end The frame at the right.
-   * @param {(name: string) => string} color By its name in the style sheet, with six digits.
+   * @param {number} end The frame at the right end.
+   * @param {(name: string) => string} color A colour of the style sheet by its name, with six hexadecimal digits.
    */
   constructor(context, width, height, end, color) {
     this.context = context;
@@ -159,7 +159,7 @@ class Sheet {
       const { status } = rows[from];
       let to = from + 1;
       while (to < rows.length && rows[to].status === status && rows[to].frame === rows[to - 1].frame + 1) to += 1;
-      // It goes up to the next piece, without a gap.
+      // The piece includes the first row of the next one, so that there is no gap between them.
       const isNext = rows[to]?.frame === rows[to - 1].frame + 1;
       this.piece(rows.slice(from, isNext ? to + 1 : to), this.color(status), status === "lost");
       from = to;
@@ -174,7 +174,7 @@ class Sheet {
   piece(rows, color, isLost) {
     const { context, step, bottom } = this;
     const [left, right] = [rows[0].frame * step, Math.max(rows[rows.length - 1].frame * step, rows[0].frame * step + 1)];
-    // Whoever is lost is seen from afar.
+    // A lost object gets a coloured background, so that it is easy to spot.
     if (isLost) {
       context.globalAlpha = 0.22;
       context.fillStyle = color;
@@ -210,10 +210,10 @@ class Sheet {
     context.fill();
   }
 
-  /** Where a frame is, with its number and its score.
+  /** A vertical line at a frame, with the frame's number and score.
    * @param {number} frame
    * @param {Row | undefined} row
-   * @param {boolean} isShown Else the mouse is over it. */
+   * @param {boolean} isShown False for the frame under the mouse. */
   line(frame, row, isShown) {
     const { context, width, bottom } = this;
     const x = Math.min(Math.max(frame * this.step, 1), width - 1);

@@ -2,17 +2,17 @@
 
 /**
  * @typedef {object} Step An object before it is changed.
- * @property {number} number Of the object.
- * @property {Map<number, Row>} [rows] Nothing for an object that is added.
+ * @property {number} number The object's.
+ * @property {Map<number, Row>} [rows] Undefined for an object that is added.
  * @property {TrackerState[]} saves
  * @property {number} last The last frame.
  * @property {number} first The first frame.
- * @property {Follower} [follower] The session, where it learns nothing of the correction.
+ * @property {Follower} [follower] The session, if it can go on after the undo: it has not learned from the correction.
  * @property {FollowedObject} [deleted]
  */
 
 const MOST_STEPS = 50;
-/** Of the states in all steps: the oldest steps go where they take more. */
+/** Most bytes of the states in all steps. Over that, the oldest steps are dropped. */
 const MOST_BYTES = 128 << 20;
 
 export class Undoing {
@@ -21,9 +21,9 @@ export class Undoing {
     this.steps = [];
   }
 
-  /** What brings an object back to how it is now.
+  /** A step that restores the present rows and states of an object.
    * @param {Run} run
-   * @param {FollowedObject | undefined} object Nothing for one that is added. */
+   * @param {FollowedObject | undefined} object Undefined for an object that is added. */
   before(run, object) {
     const { rows, saves = [], number = run.count, follower } = object ?? {};
     const [first] = run.frames.numbers;
@@ -36,21 +36,21 @@ export class Undoing {
     while (this.steps.length > 1 && bytesIn(this.steps) > MOST_BYTES) this.steps.shift();
   }
 
-  /** Brings back what was before the last change.
+  /** Undoes the last change.
    * @param {Run} run
-   * @returns {Promise<string | undefined>} The name of the object, where it is there. */
+   * @returns {Promise<string | undefined>} The name of the object; undefined where it is gone. */
   async undo(run) {
     const [step] = this.steps.slice(-1);
     const find = () => step.deleted ?? run.objects.find(({ number }) => number === step.number);
     let object = find();
     let name = object?.name;
-    // Where this fails, the step stays.
+    // If this throws, the step stays.
     if (object && step.rows) {
       await bringBack(run, object, step);
       forgetBefore(run, step.first);
     } else if (object) run.remove(object);
     else if (run.drawn && !run.drawn.object) {
-      // It may be there once the service has answered.
+      // The new object's box may have been sent: its object appears when the service answers.
       name = `Object ${step.number + 1}`;
       run.drawn = undefined;
       await run.alone(async () => {
@@ -68,14 +68,14 @@ export class Undoing {
   }
 }
 
-/** What the states in steps take. Most are in several.
+/** The bytes of the states in steps. Most states are in several steps, and count once.
  * @param {Step[]} steps */
 function bytesIn(steps) {
   const states = new Set(steps.flatMap(({ saves }) => saves));
   return [...states].reduce((sum, { bytes }) => sum + bytes.length, 0);
 }
 
-/** Gives up frames that were tracked backwards, where no object has a row any more.
+/** Removes frames before `first`, which were tracked backwards, if no object has a row there.
  * @param {Run} run
  * @param {number} first */
 function forgetBefore(run, first) {
@@ -95,7 +95,8 @@ async function bringBack(run, object, { rows = new Map(), saves, last, follower,
   run.drawn = undefined;
   await run.alone(async () => {
     const isSame = object.follower === follower;
-    // A run that goes on later catches up then, unless rows follow from what is undone.
+    // Catches up in a new session where rows after `last` depend on the change, or the session goes on being used. A
+    // stopped run with `wake` catches up when it goes on.
     const isAnew = !isSame && !run.source.isAbsent && (run.lastFrame > last || (!run.wake && (run.isLocal || !run.isResting)));
     const draft = object.draft(isAnew ? run.follower() : object.follower);
     draft.frames = object.frames;

@@ -1,14 +1,14 @@
-// A video file: decoded frame by frame where the browser gives a page its decoders, else played.
+// Opens a video file: decodes it frame by frame if the page has `VideoDecoder`, else plays it in an element.
 
 import { FrameDecoder, FrameNumbers } from "./decoder.js";
 import { openPlayed } from "./file.js";
 import { drawScaled, encoded } from "./source.js";
 import { Stills, undamaged } from "./stills.js";
 
-/** Where the frames of a file are; nothing where that cannot be told, or the browser does not decode them for a page.
+/** The index of a file's frames; undefined where it cannot be read, or the browser cannot decode the codec.
  * @param {File} file */
 async function indexOf(file) {
-  // Pages that came over plain http are not given it.
+  // Over plain http, pages have no `VideoDecoder`.
   if (typeof VideoDecoder === "undefined") return undefined;
   const worker = new Worker(new URL("./indexer.js", import.meta.url), { type: "module" });
   try {
@@ -31,14 +31,14 @@ async function indexOf(file) {
 
 /**
  * @param {File} file
- * @param {HTMLElement} place Where the file can be played.
+ * @param {HTMLElement} place The parent for a video element.
  * @returns {Promise<Source>}
  */
 export async function openVideo(file, place) {
   const opening = openPlayed(file, place);
   const [index, player] = await Promise.all([indexOf(file), opening.catch(() => undefined)]);
   try {
-    // What an element plays has the shape of its pixels and is turned as it should be.
+    // The size that an element reports considers the aspect ratio of pixels and the rotation.
     const source = index && (await decodedFile(file, index, player?.size));
     if (source) player?.close();
     return source ?? opening;
@@ -59,7 +59,7 @@ async function decodedFile(file, index, size) {
   const { times } = frames;
   const mean = (times.length - 1) / (times[times.length - 1] - times[0]);
   const source = new Stills(file.name, mean || 25);
-  // What is looked at while the file goes on does not hold it up.
+  // A second decoder for frames that the user looks at, so that tracking does not wait for them.
   const [decoder, viewer] = [0, 1].map(() => new FrameDecoder(file, index, frames));
   const pictureOf = async (/** @type {FrameDecoder} */ from, /** @type {number} */ number) => {
     const frame = await from.at(number);

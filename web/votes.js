@@ -1,15 +1,15 @@
-// The bag with its votes: a column for each subspace, its vote as a bar over its mean and its basis.
+// The bag with its votes: a column for each subspace, with the vote as a bar above the mean and the basis.
 
-/** Places in a bag, as long as it has no more. */
+/** Least number of columns. */
 const PLACES = 10;
-/** Most vectors of a subspace that are shown: its mean and some of its basis. */
+/** Vectors of a subspace that are shown: the mean and the first ones of the basis. */
 const VECTORS = 3;
 const GAP = 4;
-/** Of the pixels around the vectors in the picture of a bag. */
+/** The colour around the vectors in the service's picture of a bag. */
 const GROUND = [24, 25, 28];
-/** The vote that a bar is as high as can be for, where none has more. */
+/** The vote with a bar of full height, unless one is larger. */
 const FULL = 0.25;
-/** How light a subspace is that has no vote. */
+/** The opacity of a subspace without votes. */
 const FAINT = 0.45;
 
 export class Votes {
@@ -106,7 +106,7 @@ export class Votes {
   }
 }
 
-/** A canvas as large as it is shown, with columns in it.
+/** Sizes a canvas to the pixels of the screen, and divides it into columns.
  * @param {HTMLCanvasElement} canvas
  * @param {number} columns */
 function fitted(canvas, columns) {
@@ -117,7 +117,7 @@ function fitted(canvas, columns) {
   return { context: canvas.getContext("2d"), width, height, step, wide: step - gap };
 }
 
-/** Where the vectors are in the picture of a bag, found by the ground between them.
+/** Finds the rectangles of the vectors in the picture of a bag, by the background between them.
  * @param {ImageBitmap} image */
 function tilesOf(image) {
   const canvas = new OffscreenCanvas(image.width, image.height);
@@ -129,7 +129,7 @@ function tilesOf(image) {
   return down.map(([y, height]) => across.map(([x, width]) => ({ x, y, width, height })));
 }
 
-/** Runs of pixels that are not ground: where each begins, and how long it is.
+/** The runs of pixels that are not background: start and length of each.
  * @param {Uint8ClampedArray} pixels */
 function runs(pixels) {
   /** @type {[number, number][]} */

@@ -1,4 +1,4 @@
-// The first screen: a recorded clip plays with the box that the tracker gave, and the particles that it compared.
+// The first screen plays a drawn clip, with recorded boxes and particles of the tracker.
 
 import { canvas } from "./dom.js";
 import { FRAMES, HEIGHT, WIDTH, drawScene } from "./scene.js";
@@ -6,21 +6,21 @@ import { paintBox } from "./stage.js";
 import { PARTICLES, ROWS } from "./welcome-rows.js";
 
 const FRAMES_A_SECOND = 30;
-/** The still for those who do not want motion. */
+/** The frame for users who prefer reduced motion. */
 const STILL = 150;
-/** Of a box to its width. */
+/** Height of a box for a width of 1. */
 const HEIGHT_OF_BOX = 73 / 128;
-/** Frames that have the same particles, and how many they are. */
+/** The number of frames that share their particles, and the number of particles. */
 const [EVERY, SHOWN] = [4, 16];
 
-/** What the tracker gave, in pixels of the scene.
+/** The tracker's box in a frame, in pixels of the scene.
  * @param {number} frame */
 export function boxOf(frame) {
   const [x, y, width] = [0, 2, 4].map((at) => 6 * frame + at).map((at) => parseInt(ROWS.slice(at, at + 2), 36) / 2);
   return { x, y, width, height: width * HEIGHT_OF_BOX };
 }
 
-/** Places from the middle of the box, likeliest first. The first frames have none.
+/** The particles in a frame, relative to the middle of the box, likeliest first. The first `EVERY` frames have none.
  * @param {number} frame */
 function particlesOf(frame) {
   const from = (Math.floor(frame / EVERY) - 1) * SHOWN;
@@ -47,7 +47,7 @@ function paint(context, frame) {
 /** Plays the clip as long as the first screen is shown. */
 export function playWelcome() {
   const own = canvas("hero");
-  // As sharp as where it is shown, up to twice.
+  // The resolution of the screen, up to twice that of the scene.
   const scale = Math.min(2, Math.max(1, (own.clientWidth * devicePixelRatio) / WIDTH));
   [own.width, own.height] = [WIDTH * scale, HEIGHT * scale];
   const context = /** @type {CanvasRenderingContext2D} */ (own.getContext("2d"));

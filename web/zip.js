@@ -1,10 +1,10 @@
-// A ZIP archive of texts, which are stored as they are.
+// Makes a ZIP archive of texts, stored without compression.
 
 const encoder = new TextEncoder();
-/** The first of January 1980, the earliest date of the format. */
+/** 1 January 1980, the earliest date of the format. */
 const DATE = 0x21;
 const VERSION = 20;
-/** Names are UTF-8. */
+/** Bit 11: names are UTF-8. */
 const FLAGS = 0x800;
 
 const TABLE = Uint32Array.from({ length: 256 }, (_, byte) => {
@@ -20,7 +20,7 @@ function crc32(bytes) {
   return ~value >>> 0;
 }
 
-/** Numbers of two and four bytes, the lowest first.
+/** Numbers of two and four bytes, little-endian.
  * @param {[number, 2 | 4][]} fields */
 function packed(fields) {
   const bytes = new Uint8Array(fields.reduce((sum, [, size]) => sum + size, 0));
