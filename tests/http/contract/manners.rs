@@ -1,4 +1,4 @@
-//! What answers look like to people, and which version gives them.
+//! How answers read for people, and the version that they name.
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::pictures;
@@ -27,7 +27,7 @@ async fn answers_end_with_a_newline() {
     }
 }
 
-/// The digits after the point.
+/// How many digits the number has after the point.
 fn digits(value: &Value) -> usize {
     let text = value.to_string();
     text.split_once('.').map_or(0, |(_, digits)| digits.len())
@@ -68,7 +68,7 @@ async fn the_parameters_are_named_when_that_is_asked_for() {
         )
         .await
     };
-    // The same session each time.
+    // The same id each time, so the session is only opened once.
     for quiet in [None, Some("false"), Some("0")] {
         assert!(put(quiet).await.get("parameters").is_none());
     }

@@ -1,4 +1,4 @@
-//! The OpenAPI document: committed, generated, and held to the code.
+//! The OpenAPI document: the committed file is the generated one, and agrees with the code.
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::pictures;
@@ -274,7 +274,7 @@ fn the_parameters_of_the_tracker_can_be_typed_in_a_query() {
 fn calls_stand_in_the_order_in_which_they_are_used() {
     let text = bagtrack::http::openapi_document();
     let text: String = text.split_whitespace().collect();
-    // Links name operations, too, and have no summary.
+    // Links contain an `operationId` too, but no summary after it.
     let call = |name: &str| format!("\"operationId\":\"{name}\",\"summary\"");
     let at = |name: &str| text.find(&call(name)).expect(name);
     let order = [

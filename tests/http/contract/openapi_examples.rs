@@ -1,4 +1,4 @@
-//! The examples of the document, sent as they stand: what "Try it out" does.
+//! The examples of the OpenAPI document, sent unchanged, as "Try it out" of Swagger UI does.
 
 use crate::application::TestApplication;
 use base64::prelude::{BASE64_STANDARD, Engine};
@@ -6,7 +6,7 @@ use reqwest::{Method, Response};
 use serde_json::Value;
 use std::collections::BTreeSet;
 
-/// A WebSocket handshake, which no plain request makes.
+/// The operation that is a WebSocket handshake, and so left out here.
 const HANDSHAKE: &str = "openStream";
 
 /// An operation of the document.
@@ -34,7 +34,7 @@ impl<'a> Call<'a> {
         self.operation["operationId"].as_str().unwrap()
     }
 
-    /// What Swagger UI fills in for the parameters in this place.
+    /// The values that Swagger UI fills in for the parameters in this place (`path`, `query` or `header`).
     fn given(&self, place: &str) -> Vec<(&'a str, String)> {
         let parameters = self.operation["parameters"].as_array();
         let here = parameters
@@ -58,12 +58,12 @@ impl<'a> Call<'a> {
         given.collect()
     }
 
-    /// The bodies: none, or each example, and its frame as a raw body of each media type of a file.
+    /// The bodies to send: none; or each example, and its frame as a raw body of each media type of a file.
     fn bodies(&self) -> Vec<(&'a str, Vec<u8>)> {
         let Some(content) = self.operation["requestBody"]["content"].as_object() else {
             return vec![("", Vec::new())];
         };
-        // A video, which needs a program: `videos` sends some.
+        // Its body is a video, which needs ffmpeg: the tests of `videos` send some.
         if self.id() == "getVideoFrames" {
             return Vec::new();
         }

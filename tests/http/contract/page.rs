@@ -1,10 +1,10 @@
-//! The page at `/`, and the sample clips that it shows. `tests/page` has it in a browser.
+//! The page at `/`, and the sample clips that it shows. `tests/page` tests it in a browser.
 
 use crate::application::{TestApplication, expect, expect_problem};
 use reqwest::StatusCode;
 use std::collections::{BTreeSet, VecDeque};
 
-/// The paths below `/page/` that the text of a file names, and whether they are loaded with it, not when they are used.
+/// The paths below `/page/` that the text of a file names, each with whether it is loaded together with the file.
 fn named(path: &str, text: &str) -> Vec<(String, bool)> {
     let folder = &path[..=path.rfind('/').unwrap()];
     let texts: Vec<&str> = text.split(['"', '\'']).collect();
@@ -14,7 +14,7 @@ fn named(path: &str, text: &str) -> Vec<(String, bool)> {
             .strip_prefix("./")
             .map(|file| format!("{folder}{file}"));
         let path = own.or(text.starts_with("page/").then(|| format!("/{text}")))?;
-        // What WebAssembly modules call their imports is no file.
+        // WebAssembly modules name their imports by such a path, which is no file to load.
         let path = Some(path).filter(|path| !path.ends_with("_bg.js"))?;
         let is_later = before.ends_with("import(") || before.ends_with("URL(");
         (path.ends_with(".js") || path.ends_with(".css")).then_some((path, !is_later))

@@ -1,4 +1,4 @@
-//! The types of problems lead to a page, with the causes and the cure of each.
+//! The `type` of each problem leads to a page with its causes and its cure.
 
 use crate::application::{BOX, TestApplication};
 use crate::pictures;

@@ -6,7 +6,7 @@ use crate::helpers::provoke::{Attempt, Operation};
 use serde_json::Value;
 use std::collections::BTreeSet;
 
-/// The problems that a description leads to, with their statuses: `[…](problems#slug) (status)`.
+/// The slugs and statuses of the problems that a description links to: `[…](problems#slug) (status)`.
 fn named(description: &str) -> Vec<(String, String)> {
     let links = description.split("](problems#").skip(1);
     let named = links.map(|link| {
@@ -16,7 +16,7 @@ fn named(description: &str) -> Vec<(String, String)> {
     named.collect()
 }
 
-/// Whether it takes a video, and so a program, to provoke it: `videos` has those.
+/// Whether only a video, and so ffmpeg, can provoke the problem: the tests of `videos` do that.
 fn needs_a_video(operation: &Operation, slug: &str) -> bool {
     operation.path == "/frames" && matches!(slug, "frame-damaged" | "work-timeout")
 }
@@ -52,9 +52,9 @@ async fn every_documented_problem_can_be_provoked_and_changes_no_session() {
     for (operation, slug) in &documented {
         let is_elsewhere = match &**slug {
             "work-timeout" => true,
-            // The pictures of a video take an ffmpeg.
+            // For `/frames` that is a video, which needs ffmpeg.
             "frame-too-large" => operation.path == "/frames",
-            // One frame costs too much where it takes long; several, where their headers say so.
+            // The cost of one frame, as posted here, is known only after it took long; that of several, from headers.
             "request-too-costly" => {
                 !["/track", "/sessions/{id}/frames"].contains(&&*operation.path)
             }
@@ -76,7 +76,7 @@ async fn every_documented_problem_can_be_provoked_and_changes_no_session() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn work_that_waits_too_long_is_a_problem_wherever_it_is_documented() {
     let documented = documented().into_iter();
-    // A stream waits for the session alone, and so only for a frame that is at work there.
+    // A stream takes no work to open. It waits for its session alone, while that tracks a frame.
     let timed = documented
         .filter(|(operation, slug)| slug == "work-timeout" && !operation.path.ends_with("/stream"));
     let operations: Vec<Operation> = timed.map(|(operation, _)| operation).collect();
@@ -85,7 +85,7 @@ async fn work_that_waits_too_long_is_a_problem_wherever_it_is_documented() {
     let mut tries = 0;
     let responses = loop {
         tries += 1;
-        // The worker was not busy to the end where the machine held the requests up for so long.
+        // Tries again if the worker had finished before all requests were answered, as on a busy machine.
         match blocked.attempts(&operations).await {
             Some(responses) => break responses,
             None => assert!(tries < 20, "the frame never takes long enough"),

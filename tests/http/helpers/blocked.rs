@@ -20,9 +20,9 @@ impl Blocked {
         let app = TestApplication::start_with(|config| {
             config.workers = Some(1);
             config.work_timeout = Duration::from_millis(20);
-            // It is asked for its metrics again and again.
+            // Lifts the limit of requests: the helper polls the metrics.
             behind_a_proxy(config);
-            // So that the large frame is decoded.
+            // Allows the large frame, whose decoding keeps the worker busy.
             config.max_frame_memory = 1 << 30;
         });
         let app = app.await;
@@ -39,8 +39,8 @@ impl Blocked {
         }
     }
 
-    /// The answers to these operations, sent while the worker decodes one large frame. None, where it had decoded that
-    /// before all of them were answered.
+    /// The answers to these operations, sent while the worker decodes one large frame; `None` if the worker had
+    /// finished before all of them were answered.
     pub async fn attempts(&self, operations: &[Operation]) -> Option<Vec<Response>> {
         let block = async {
             loop {
@@ -58,7 +58,7 @@ impl Blocked {
             };
             let attempts = operations.iter().map(|operation| self.attempt(operation));
             let responses = futures_util::future::join_all(attempts).await;
-            // Nothing else has begun, so the worker was never free.
+            // No other piece of work has begun, so the worker was busy throughout.
             (self.begun_at_work().await == Some(begun)).then_some(responses)
         };
         tokio::select! {
@@ -67,7 +67,7 @@ impl Blocked {
         }
     }
 
-    /// How many pieces of work have begun, if the worker is at one of them.
+    /// How many pieces of work have begun; `None` if the worker is idle.
     async fn begun_at_work(&self) -> Option<f64> {
         let text = metrics(&self.app).await;
         let is_busy = value(&text, "bagtrack_workers_busy", &[]) == 1.0;
@@ -76,7 +76,7 @@ impl Blocked {
 
     async fn attempt(&self, operation: &Operation) -> Response {
         let path = operation.path_of(&self.id);
-        // Numbered, since frames without numbers may not come at once.
+        // Numbered, because a session takes only one frame without a number at a time.
         let query: &[(&str, &str)] = match (operation.takes_frames(), operation.path.as_str()) {
             (false, _) => &[],
             (_, path) if path.ends_with("/frames") => &[("frame", "1")],
@@ -90,7 +90,7 @@ impl Blocked {
         request.send().await.unwrap()
     }
 
-    /// What timed out while it waited was not done.
+    /// Waits for the worker, and checks that it has not done the requests that timed out.
     pub async fn finish(self) {
         while self.begun_at_work().await.is_some() {}
         assert_eq!(self.app.frames_of(&self.id).await, 1);

@@ -1,4 +1,4 @@
-//! Requests that keep a worker busy: many frames, for sessions with the most expensive parameters there are.
+//! Requests that keep a worker busy: many frames for sessions with the most expensive parameters.
 
 use crate::application::{BOX, TestApplication};
 use crate::helpers::raw::RawConnection;
@@ -12,7 +12,7 @@ use tokio::task::JoinSet;
 
 pub use bagtrack_testing::picture_files::bomb;
 
-/// Frames of one request that take the worker some seconds.
+/// How many frames in one request take the worker some seconds.
 pub const FRAMES: usize = 200;
 
 /// The most expensive parameters.
@@ -36,14 +36,14 @@ pub async fn open(app: &TestApplication) -> String {
             StatusCode::CREATED => {
                 return response.headers()["location"].to_str().unwrap().to_owned();
             }
-            // A busy machine may take longer for it than the time that a test gives its requests.
+            // On a busy machine, opening may take longer than the test's limit for requests: try again.
             StatusCode::SERVICE_UNAVAILABLE => {}
             other => panic!("{other} to an opening"),
         }
     }
 }
 
-/// The request with so many frames for this session.
+/// A request with this number of frames for the session at this path.
 pub fn post(app: &TestApplication, session: &str, frames: usize) -> RequestBuilder {
     let request = app.request(Method::POST, &format!("{session}/frames"), &[]);
     request.multipart(same_frames(frames))
@@ -62,7 +62,7 @@ pub async fn fill_queue(app: &TestApplication) -> JoinSet<()> {
         format!("http://{}{session}/frames", app.address),
     );
     busy.spawn(async move {
-        // The place may be the other request's below when this one comes.
+        // Refused if the other request below has the place when this one arrives: try again.
         while let Ok(_answered) = client
             .post(&url)
             .multipart(same_frames(FRAMES))
@@ -75,7 +75,7 @@ pub async fn fill_queue(app: &TestApplication) -> JoinSet<()> {
     busy
 }
 
-/// Sends a request with a body for this path by hand.
+/// Sends a request to this path over a raw connection.
 pub async fn send_raw(app: &TestApplication, path: &str, request: RequestBuilder) -> RawConnection {
     let mut request = request.build().unwrap();
     let body = request.body_mut().take().expect("it has a body");

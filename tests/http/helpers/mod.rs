@@ -1,4 +1,4 @@
-//! What several subjects use: requests that are heavy, slow, raw, forged, or that provoke a problem, and videos.
+//! Helpers for several groups of tests: heavy, slow, raw and forged requests, requests that provoke a problem, videos.
 
 pub mod blocked;
 pub mod forged;

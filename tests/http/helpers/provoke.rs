@@ -1,4 +1,4 @@
-//! How each problem is provoked: a request that would succeed, with one thing wrong.
+//! Provokes each problem by a request that would succeed, but for one fault.
 
 use crate::application::{BOX, TestApplication, behind_a_proxy};
 use crate::helpers::heavy;
@@ -13,7 +13,7 @@ use reqwest::{Method, Response, StatusCode};
 use std::time::Duration;
 use tokio::task::JoinSet;
 
-/// The id of a session that there is not.
+/// The id of a session that does not exist.
 const NEW_ID: &str = "67e55044-10b1-426f-9247-bb680e5fe0c8";
 
 /// An operation of the OpenAPI document.
@@ -31,7 +31,7 @@ impl Operation {
         }
     }
 
-    /// Its path for a session of this id. A session that is about to be opened has another.
+    /// The path for the session with this id. The operation that opens a session gets a new id.
     pub fn path_of(&self, id: &str) -> String {
         let opens = self.method == Method::PUT && self.path.ends_with("{id}");
         self.path.replace("{id}", if opens { NEW_ID } else { id })
@@ -45,9 +45,9 @@ impl Operation {
 /// A request that is about to fail.
 pub struct Attempt {
     app: TestApplication,
-    /// A session that stands at its first frame.
+    /// The id of a session that has its first frame only.
     id: Option<String>,
-    /// Requests that are kept inside.
+    /// Open requests that take places until this is dropped.
     _held: Option<RawConnection>,
     _busy: Option<JoinSet<()>>,
     _stream: Option<StreamClient>,
@@ -58,9 +58,9 @@ pub struct Attempt {
     frames: usize,
     media_type: Option<&'static str>,
     idempotency_key: Option<&'static str>,
-    /// Goes beside the frame.
+    /// Sent in the form beside the frame.
     snapshot: Option<Vec<u8>>,
-    /// Sends the head alone.
+    /// Whether only the head of the request is sent.
     without_body: bool,
 }
 
@@ -79,7 +79,7 @@ fn settings(slug: &str, config: &mut Config) {
         }
         "quota-exceeded" => {
             config.limits.client_requests = Some(1);
-            // Of a proxy the streams count, and not the connections.
+            // Behind a trusted proxy, the limit applies to a client's streams, not to the proxy's connections.
             config.limits.client_connections = Some(1);
             behind_a_proxy(config);
         }
@@ -96,10 +96,10 @@ fn settings(slug: &str, config: &mut Config) {
 }
 
 impl Attempt {
-    /// A service and a request to this operation that meets this problem.
+    /// Starts a service, and prepares a request to this operation that gets this problem.
     pub async fn provoke(operation: &Operation, slug: &str) -> Self {
         let app = TestApplication::start_with(|config| settings(slug, config)).await;
-        // Nothing can be opened.
+        // Without the store, no session can be opened.
         let (id, is_open) = match slug == "store-unavailable" {
             true => (NEW_ID.to_owned(), false),
             false => (app.open().await, true),
@@ -209,7 +209,7 @@ impl Attempt {
                 let held = RawConnection::hold(self.app.address, "POST", &target, 1000);
                 self._held = Some(held.await);
             }
-            // Every operation answers a panic through the same layer; no input makes the real ones panic.
+            // A route of the test that panics: every operation answers panics through the same layer.
             "internal" => (self.method, self.path) = (Method::GET, "/panic".to_owned()),
             "not-ready" => {
                 self.app.shut_down();
@@ -225,7 +225,7 @@ impl Attempt {
             .app
             .request(self.method.clone(), &self.path, &self.query);
         if self.path.ends_with("/stream") {
-            // What opens a WebSocket; the key may be any 16 bytes.
+            // The header of a WebSocket handshake; the key may be any 16 bytes.
             request = request
                 .header("connection", "upgrade")
                 .header("upgrade", "websocket")
@@ -258,7 +258,7 @@ impl Attempt {
         request.send().await.unwrap()
     }
 
-    /// Frames that the session has taken: the problem must not have changed it.
+    /// How many frames the session has taken: a refused request must not change that.
     pub async fn frames_of_the_session(&self) -> Option<u64> {
         match &self.id {
             Some(id) => Some(self.app.frames_of(id).await),

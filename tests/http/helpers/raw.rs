@@ -1,4 +1,4 @@
-//! A client that speaks HTTP by hand, to send slowly or not at all.
+//! A client that writes HTTP to a socket by hand, to send slowly or in part.
 
 use bagtrack_testing::within::within;
 use std::net::{IpAddr, SocketAddr};
@@ -16,7 +16,7 @@ impl RawConnection {
         Self { stream }
     }
 
-    /// From another address of this machine.
+    /// Connects from another address of this machine.
     pub async fn open_from(from: IpAddr, address: SocketAddr) -> Self {
         let socket = TcpSocket::new_v4().unwrap();
         socket.bind(SocketAddr::new(from, 0)).unwrap();
@@ -28,13 +28,13 @@ impl RawConnection {
         self.stream.write_all(bytes.as_ref()).await.unwrap();
     }
 
-    /// Sends, if the connection still takes it.
+    /// Sends bytes; fails if the service has closed the connection.
     pub async fn try_send(&mut self, bytes: impl AsRef<[u8]>) -> std::io::Result<()> {
         self.stream.write_all(bytes.as_ref()).await
     }
 
-    /// Sends `ask`, and reads at most `bytes` of the answers at a time, with a pause before each. Gives how many came
-    /// until the connection ended.
+    /// Sends `ask`, and reads the answers by at most `bytes` at a time, with a pause before each read. Returns the
+    /// number of bytes that came until the connection ended.
     pub async fn trickle(self, ask: String, bytes: usize, pause: Duration) -> usize {
         let (mut reading, mut writing) = self.stream.into_split();
         let asking = tokio::spawn(async move {
@@ -53,7 +53,7 @@ impl RawConnection {
         all
     }
 
-    /// What comes until so many answers have begun.
+    /// Reads until `count` answers have begun.
     pub async fn read_answers(&mut self, count: usize) -> String {
         let mut bytes = Vec::new();
         loop {
@@ -67,13 +67,13 @@ impl RawConnection {
         }
     }
 
-    /// Sends, without giving anybody else a turn.
+    /// Sends without awaiting, so that no other task runs meanwhile.
     pub fn send_now(&self, bytes: impl AsRef<[u8]>) {
         let bytes = bytes.as_ref();
         assert_eq!(self.stream.try_write(bytes).unwrap(), bytes.len());
     }
 
-    /// How many answers there are to read.
+    /// How many answers have arrived, without awaiting.
     pub fn answers_now(&self) -> usize {
         let (mut bytes, mut buffer) = (Vec::new(), [0; 4096]);
         while let Ok(count @ 1..) = self.stream.try_read(&mut buffer) {
@@ -82,12 +82,12 @@ impl RawConnection {
         String::from_utf8_lossy(&bytes).matches("HTTP/1.1 ").count()
     }
 
-    /// Closes its own side of the connection.
+    /// Closes the client's side of the connection.
     pub async fn close_sending(&mut self) {
         self.stream.shutdown().await.unwrap();
     }
 
-    /// What comes next, or nothing where the connection was closed.
+    /// The next bytes; empty if the connection was closed.
     pub async fn read_some(&mut self) -> String {
         let mut bytes = Vec::new();
         let read = self.stream.read_buf(&mut bytes);
@@ -95,8 +95,8 @@ impl RawConnection {
         String::from_utf8(bytes).unwrap()
     }
 
-    /// Announces a body of `length` bytes and waits until the service asks for it: from then on the request is
-    /// inside, and it stays there until the body is sent.
+    /// Announces a body of `length` bytes, and waits until the service asks for it by `100 Continue`. The service then
+    /// handles the request until the body is sent.
     pub async fn hold(address: SocketAddr, method: &str, target: &str, length: usize) -> Self {
         Self::hold_with(
             address,
@@ -107,7 +107,7 @@ impl RawConnection {
         .await
     }
 
-    /// Like [`Self::hold`], with other header lines than a length.
+    /// Like [`Self::hold`], with these header lines instead of a length.
     pub async fn hold_with(address: SocketAddr, method: &str, target: &str, lines: &str) -> Self {
         let mut connection = Self::open(address).await;
         let head = format!(
@@ -123,7 +123,7 @@ impl RawConnection {
         connection
     }
 
-    /// The next answer, whose length is announced; the connection may stay open.
+    /// The next answer, which must have a `Content-Length`; the connection may stay open.
     pub async fn read_answer(&mut self) -> String {
         let mut bytes = Vec::new();
         loop {
@@ -142,7 +142,7 @@ impl RawConnection {
         }
     }
 
-    /// Everything until the service closes the connection.
+    /// All bytes until the service closes the connection.
     pub async fn read_to_end(&mut self) -> String {
         let mut bytes = Vec::new();
         let read = self.stream.read_to_end(&mut bytes);

@@ -1,4 +1,4 @@
-//! A line between a client and the service that delays all bytes, and that can break.
+//! A connection between a client and the service that delays all bytes, and can be broken.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -14,7 +14,7 @@ pub struct SlowLine {
 }
 
 impl SlowLine {
-    /// To the service at `target`; a byte takes `delay` each way.
+    /// A line to the service at `target`, which delays bytes by `delay` each way.
     pub async fn to(target: SocketAddr, delay: Duration) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();
@@ -40,7 +40,7 @@ impl SlowLine {
         Self { address, broken }
     }
 
-    /// Breaks all connections there are. New ones can be made.
+    /// Breaks all present connections. Clients can make new ones.
     pub fn cut(&self) {
         self.broken.send_modify(|count| *count += 1);
     }

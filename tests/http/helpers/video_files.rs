@@ -28,7 +28,7 @@ pub fn video(extension: &str) -> Vec<u8> {
     std::fs::read(file).unwrap()
 }
 
-/// A file that ffmpeg makes of these arguments.
+/// The file that ffmpeg makes with these arguments.
 pub fn made(name: &str, arguments: &str) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join(name);
@@ -39,7 +39,7 @@ pub fn made(name: &str, arguments: &str) -> Vec<u8> {
     std::fs::read(file).unwrap()
 }
 
-/// So many pictures of ffmpeg's own test pattern, 320 by 240 pixels, as a video of this kind, with further arguments.
+/// A video with this many pictures of ffmpeg's test pattern, of 320 x 240 pixels, made with further arguments.
 pub fn pattern(extension: &str, pictures: u32, arguments: &str) -> Vec<u8> {
     let source = format!("testsrc2=size=320x240:rate=30 {arguments}-frames:v {pictures} -b:v 2M");
     made(&format!("pattern.{extension}"), &source)
@@ -50,14 +50,14 @@ pub fn motion_jpeg() -> Vec<u8> {
     frames.flatten().collect()
 }
 
-/// The box of an answer is on the target of drawn frame `t`.
+/// Checks that the box of an answer is on the target of drawn frame `t`.
 #[track_caller]
 pub fn expect_on_target(answer: &Value, t: u32) {
     let x = answer["box"]["x"].as_f64().unwrap();
     assert!((x - f64::from(20 + 2 * t)).abs() < 3.0, "{t}: {answer}");
 }
 
-/// What begins as an MP4 file does, and has nothing in it.
+/// Bytes that begin like an MP4 file, and contain nothing else.
 pub fn empty_mp4() -> Vec<u8> {
     [b"\0\0\0\x18ftypmp42".to_vec(), vec![0; 400]].concat()
 }

@@ -29,7 +29,7 @@ async fn sixty_four_bombs_of_another_size_hold_no_worker() {
         assert_eq!(problem["index"], 0);
     }
     app.track(&id, 1).await;
-    // Decoding them took both workers half a minute.
+    // Without the limit, decoding all frames would take both workers half a minute.
     assert_eq!(decoded(&app).await, 3, "those that were taken");
     assert!(
         sent.elapsed() < Duration::from_secs(15),
@@ -72,7 +72,7 @@ async fn work_past_its_deadline_stops_at_the_next_frame() {
     let session = heavy::open(&app).await;
     let request = heavy::post(&app, &session, 2 * heavy::FRAMES);
     expect_problem(request.send().await.unwrap(), "work-timeout").await;
-    // The only worker is free again, as soon as the machine lets it take this one in time, and the others were left.
+    // When a session can be opened, the only worker is free again: it has dropped the other frames.
     within(heavy::open(&app), "the worker is free").await;
     let decoded = decoded(&app).await;
     assert!(decoded < 2 * heavy::FRAMES, "{decoded} frames");
@@ -91,7 +91,7 @@ async fn work_whose_client_has_gone_stops_at_the_next_frame() {
     let (session, id) = (heavy::open(&app).await, app.open().await);
     let request = heavy::post(&app, &session, 2 * heavy::FRAMES);
     let client = heavy::send_raw(&app, &format!("{session}/frames"), request).await;
-    // Until the only place is taken by the long request, asked in a way that takes no place itself.
+    // Waits until the long request has the only place in the queue; `/readyz` itself takes none.
     readiness(&app, StatusCode::SERVICE_UNAVAILABLE).await;
     drop(client);
     let ask = || app.post_frame(&id, pictures::png(1));
@@ -101,8 +101,8 @@ async fn work_whose_client_has_gone_stops_at_the_next_frame() {
     assert_eq!(view["frames"], 1, "what was done is undone");
 }
 
-/// Times of a frame of forty megapixels after a replay: its own, and that of the slowest answer beside it. A replay
-/// takes next to no time; it once marked the session as one whose frames are cheap.
+/// The time of a frame of forty megapixels after a replay, and that of the slowest answer beside it. A replay takes
+/// next to no time; that must not make the service take the session's frames for cheap ones.
 async fn beside_a_large_frame(app: &TestApplication) -> (Duration, Duration) {
     let (first, next) = (heavy::large(10), heavy::large(20));
     let response = app.create(first.clone(), &[("box", LARGE_BOX)]).await;
@@ -133,12 +133,12 @@ async fn beside_a_large_frame(app: &TestApplication) -> (Duration, Duration) {
     tokio::join!(post, ask)
 }
 
-/// A busy machine may stop any process for a while; a service that stalls does so each time.
+/// Tries several times: a busy machine may stop any process for a while, but a service with this fault always stalls.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_frame_of_forty_megapixels_after_a_replay_does_not_stall_the_network_threads() {
     let app = TestApplication::start_with(|config| {
         config.workers = Some(1);
-        // Asked for itself, whose haste is not held back.
+        // Makes the test's client a trusted proxy, whose requests have no rate limit.
         config.limits.trusted_proxies = vec!["127.0.0.1/32".parse().unwrap()];
     });
     let app = app.await;

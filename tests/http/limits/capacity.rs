@@ -9,7 +9,7 @@ use std::time::Duration;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn numbered_posts_at_once_are_tracked_in_the_order_of_their_numbers() {
-    // So few that the last one's patience lasts for all before it on a busy machine.
+    // Few enough that, on a busy machine, the last one does not time out while it waits for the others.
     const POSTS: u64 = 8;
     let app = TestApplication::start_with(|config| config.session_queue = 32).await;
     let (id, other) = (app.open().await, app.open().await);

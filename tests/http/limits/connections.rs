@@ -26,7 +26,7 @@ async fn an_idle_connection_is_closed() {
     let app = TestApplication::start_with(|config| config.header_timeout = SHORT).await;
     let mut connection = RawConnection::open(app.address).await;
     assert_eq!(connection.read_to_end().await, "");
-    // One that asks on a busy machine may be idle for too long before.
+    // On a busy machine, a connection may be idle for too long before it asks: then it tries again.
     let asked = async {
         loop {
             let mut connection = RawConnection::open(app.address).await;
@@ -148,7 +148,7 @@ async fn an_open_request_ends_before_the_service_does() {
     held.send(&frame).await;
     let answer = held.read_to_end().await;
     assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
-    // Nor does a client that only holds a connection keep it up.
+    // A client that only holds a connection does not delay the end either.
     assert!(app.ended().await);
     drop(silent);
 }
@@ -177,7 +177,7 @@ async fn readiness_ends_before_the_service_does() {
     let not_ready = readiness(&app, StatusCode::SERVICE_UNAVAILABLE).await;
     expect_problem(not_ready, "not-ready").await;
     expect(app.get("/healthz").await, StatusCode::OK).await;
-    // Sessions are served until connections are refused, and their clients are told to take them elsewhere.
+    // Until connections are refused, the service answers sessions, and `Draining` tells their clients to go elsewhere.
     let answer = app.post_frame(&id, pictures::png(1)).await;
     assert_eq!(answer.headers()["draining"], "true");
     expect(answer, StatusCode::OK).await;
@@ -194,7 +194,7 @@ async fn nobody_keeps_the_places_for_probes() {
     let id = app.open().await;
     let target = format!("/sessions/{id}/frames");
     let _busy = RawConnection::hold(app.address, "POST", &target, 1_000).await;
-    // Silent ones make room, and one that was answered is closed.
+    // Silent connections are closed to make room for the probes; a probe's connection is closed after its answer.
     let mut silent = Vec::new();
     for _ in 0..20 {
         silent.push(RawConnection::open(app.address).await);

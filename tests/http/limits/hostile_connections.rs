@@ -21,7 +21,7 @@ async fn clients_that_never_read_lose_their_connections() {
     let app = app.await;
     let id = app.open().await;
     let ask = "GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n".repeat(50);
-    // They send without end, which fails when the service has closed the connection.
+    // Sends without end, and never reads; sending fails when the service has closed the connection.
     let never_reads = async || {
         let mut connection = RawConnection::open(app.address).await;
         while connection.try_send(&ask).await.is_ok() {}
@@ -44,7 +44,7 @@ async fn a_client_that_reads_too_slowly_loses_its_connection() {
     let app = app.await;
     let connection = RawConnection::open(app.address).await;
     let ask = "GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n".repeat(20_000);
-    // It reads some bytes of each answer, and never as much as would have been sent meanwhile.
+    // Reads more slowly than the answers would come.
     let trickle = connection.trickle(ask, 64 << 10, Duration::from_millis(20));
     let read = within(trickle, "the connection ends").await;
     assert!(
@@ -62,7 +62,7 @@ async fn a_client_that_reads_slowly_but_steadily_gets_all_of_its_answers() {
     });
     let app = app.await;
     let length = app.get("/openapi.json").await.bytes().await.unwrap().len();
-    // More than the buffers of its system and of the service's take.
+    // More answers than the socket buffers of both sides hold.
     let count = (6 << 20) / length;
     let ask = "GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n";
     let asks = [
@@ -94,11 +94,11 @@ async fn when_all_connections_are_taken_an_idle_one_makes_room() {
         assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
         silent.push(connection);
     }
-    // The first three had to go.
+    // The three oldest connections were closed to make room.
     for connection in &mut silent[..3] {
         assert_eq!(connection.read_to_end().await, "");
     }
-    // So has a flood of them.
+    // A flood of connections makes room for itself, too.
     for _ in 0..50 {
         for _ in 0..5 {
             silent.push(RawConnection::open(app.address).await);
@@ -133,7 +133,7 @@ async fn a_half_closed_connection_gets_its_answer() {
     client.send(head).await;
     client.send(frame).await;
     client.close_sending().await;
-    // Its last byte never comes.
+    // The last byte of the request never comes.
     let answer = client.read_to_end().await;
     assert!(!answer.contains("HTTP/1.1 200"), "{answer}");
     assert_eq!(app.frames_of(&id).await, 1);
@@ -159,7 +159,7 @@ async fn a_head_that_is_not_http_gets_its_status_and_the_connection_ends() {
         ),
     ] {
         let mut client = RawConnection::open(app.address).await;
-        // Part of a long head may be unread when the connection is closed.
+        // Sending may fail: the service may close the connection with part of a long head unread.
         let _ = client.try_send(&head).await;
         let answer = client.read_to_end().await;
         let is_right = answer.starts_with(&format!("HTTP/1.1 {status}"));
@@ -203,7 +203,7 @@ async fn what_stands_before_the_first_part_of_a_form_and_the_heads_of_parts_are_
     for begin in ["", head] {
         let mut client = RawConnection::hold_with(app.address, "POST", &path, lines).await;
         client.send(begin).await;
-        // Each piece was once looked through together with all before it, up to the end of the body, which never comes.
+        // Many small pieces, without the end of the body: the parser must not search all earlier pieces again for each.
         for _ in 0..5 {
             client.send("x".repeat(4_096)).await;
         }

@@ -89,7 +89,7 @@ async fn a_client_with_one_session_gets_its_turn_beside_one_with_forty() {
     let app = TestApplication::start_with(|config| {
         behind_a_proxy(config);
         config.workers = Some(1);
-        // A client has a quarter of it: forty such sessions.
+        // A client may have a quarter of this memory: forty of the test's sessions.
         config.limits.max_session_bytes = Some(1 << 30);
     });
     let app = app.await;
@@ -143,7 +143,7 @@ async fn what_is_left_of_the_frames_comes_back_and_is_told_by_every_call() {
     let app = app.await;
     let id = app.open().await;
     app.track(&id, 1).await;
-    // Asking takes no frame.
+    // `/readyz` takes no place in the queue.
     let full = async {
         loop {
             let response = app.get_session(&id).await;
@@ -177,7 +177,7 @@ async fn requests_that_came_at_once_leave_turns_to_other_connections() {
     assert!(before < 8, "{before}");
 }
 
-/// Asks again and again, many times at once.
+/// Sends a request again and again, many copies at once.
 async fn flood(address: SocketAddr, ask: &str) {
     let mut connection = RawConnection::open(address).await;
     loop {
@@ -190,7 +190,7 @@ const NO_KEY: &str = "POST /sessions HTTP/1.1\r\nHost: localhost\r\nContent-Leng
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_client_that_asks_too_often_is_refused_and_its_probes_its_frames_and_others_are_not() {
-    // What is refused for want of a key counts too.
+    // Requests without a key, which are refused, count too.
     for ask in [ASK, NO_KEY] {
         let app = TestApplication::start_with(|config| {
             config.access.api_keys = vec![Secret::from("me:0123456789abcdef")];

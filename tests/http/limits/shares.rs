@@ -56,7 +56,7 @@ async fn one_client_with_costly_sessions_leaves_memory_for_those_of_others() {
     });
     let app = app.await;
     let (opened, refused) = open_all(&app, GREEDY).await;
-    // It once got all of them, and everybody else 503.
+    // One client must not get the memory of all sessions, and leave others 503.
     expect_detail(refused, "quota-exceeded", &["bytes of sessions"]).await;
     assert!(opened >= 2, "{opened}");
     expect(open_dear(&app, MODEST).await, StatusCode::CREATED).await;
@@ -64,7 +64,7 @@ async fn one_client_with_costly_sessions_leaves_memory_for_those_of_others() {
     app.track(&id, 1).await;
 }
 
-/// How many dear sessions a client gets until it is refused, and what it is told then.
+/// Opens expensive sessions as this client until one is refused. Returns their number, and the refusal.
 async fn open_all(app: &TestApplication, client: &str) -> (usize, Response) {
     let mut opened = 0;
     loop {
@@ -78,12 +78,12 @@ async fn open_all(app: &TestApplication, client: &str) -> (usize, Response) {
 
 #[tokio::test]
 async fn the_share_of_sessions_shrinks_with_each_client_and_the_next_one_still_opens_some() {
-    // The defaults, but for more sessions than memory for dear ones.
+    // With the defaults, the memory does not suffice for as many expensive sessions as are allowed.
     let app = TestApplication::start_with(behind_a_proxy).await;
     let mut shares = Vec::new();
     for client in 1..=6 {
         let (opened, refused) = open_all(&app, &format!("198.51.100.{client}")).await;
-        // Three have their quarters, and those after them half of what is left.
+        // Three clients get a quarter of the memory each, later ones half of what is left.
         let slug = match client {
             1..=3 => "quota-exceeded",
             _ => "too-many-sessions",
@@ -103,7 +103,7 @@ async fn the_share_of_sessions_shrinks_with_each_client_and_the_next_one_still_o
     app.track(&id, 1).await;
 }
 
-/// Bytes of a body that is held, and of the memory for all of them.
+/// Bytes of a body that a client holds open, and of the memory for all uploads.
 const HELD: usize = 1 << 20;
 const UPLOADS: usize = 8 * HELD;
 
@@ -121,17 +121,18 @@ async fn upload_bytes(app: &TestApplication) -> usize {
     value(&metrics(app).await, "bagtrack_upload_bytes", &[]) as usize
 }
 
-/// Sends a body but for its last byte; nothing where it is refused, what holds its memory otherwise.
+/// Sends a body without its last byte. Returns the connection, which keeps the body's memory taken; `None` if the
+/// service refuses the body.
 async fn hold_body(app: &TestApplication, client: &str) -> Option<RawConnection> {
     hold_body_with(app, "/sessions", &format!("X-Forwarded-For: {client}")).await
 }
 
-/// The same, of a post to this path with this header line.
+/// Like [`hold_body`], for a post to this path with this header line.
 async fn hold_body_with(app: &TestApplication, path: &str, line: &str) -> Option<RawConnection> {
     let before = upload_bytes(app).await;
     let lines = format!("{line}\r\nContent-Length: {HELD}");
     let mut body = RawConnection::hold_with(app.address, "POST", path, &lines).await;
-    // It may be refused before all of it has come.
+    // Sending may fail: the service may refuse the body before all of it has come.
     let _ = body.try_send(vec![7; HELD - 1]).await;
     loop {
         tokio::select! {
@@ -149,7 +150,7 @@ async fn hold_body_with(app: &TestApplication, path: &str, line: &str) -> Option
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_addresses_of_one_network_hold_half_of_the_memory_for_bodies_and_others_upload() {
     for network in [
-        // Of 64 bits, of 56, and of 48.
+        // Addresses with the first 64, 56 and 48 bits in common.
         |client: u16| format!("2001:db8:1:2::{client:x}"),
         |client: u16| format!("2001:db8:1:{client:x}::1"),
         |client: u16| format!("2001:db8:1:{client:x}00::1"),
@@ -159,7 +160,7 @@ async fn the_addresses_of_one_network_hold_half_of_the_memory_for_bodies_and_oth
         for client in 1..=6 {
             held.extend(hold_body(&app, &network(client)).await);
         }
-        // One client may hold a quarter, and a network no more than is free.
+        // One client (a network of 64 bits) may hold a quarter of the memory; a larger network, half of it.
         let of_one_client = network(1).split("::").next() == network(2).split("::").next();
         let most = if of_one_client { 2 } else { 4 };
         assert_eq!(held.len(), most, "{}", network(1));
@@ -176,7 +177,8 @@ async fn the_addresses_of_one_network_hold_half_of_the_memory_for_bodies_and_oth
     }
 }
 
-/// A service with one key, two sessions of it, and what a page with a token for the first one says.
+/// A service with one key, two sessions of that key, and the authorization header of a page that has a token for the
+/// first session.
 async fn beside_a_page(change: fn(&mut Config)) -> (TestApplication, [String; 2], String) {
     let app = TestApplication::start_with(|config| {
         behind_a_proxy(config);
@@ -201,7 +203,7 @@ async fn stalled_bodies_of_a_page_leave_memory_to_the_other_sessions_of_its_key(
     for _ in 0..6 {
         held.extend(hold_body_with(&app, &path, &line).await);
     }
-    // The key has a quarter, and the page no more than it leaves of that.
+    // The key may hold a quarter of the memory, and the page's bodies count towards that quarter.
     assert_eq!(held.len(), 1);
     let mut picture = pictures::png(1);
     picture.resize(HELD / 2, 0);
@@ -273,13 +275,13 @@ async fn half_messages_of_one_network_leave_memory_to_others_and_end_at_their_de
     }
     let began = Instant::now();
     for stream in &mut streams {
-        // A binary message of 250,000 bytes, masked with zeros, of which the last thousand never come.
+        // The head of a binary message of 250,000 bytes, masked with zeros. Its last thousand bytes never come.
         stream
             .send_raw(&[0x82, 0xFF, 0, 0, 0, 0, 0, 3, 0xD0, 0x90, 0, 0, 0, 0])
             .await;
         stream.send_raw(&vec![0; 249_000]).await;
     }
-    // All of them would take 8 MB.
+    // Without the limit, the messages would take 8 MB.
     let held = async { while upload_bytes(&app).await < UPLOADS / 2 - HELD / 2 {} };
     within(held, "the messages are charged").await;
     let mut picture = pictures::png(0);
@@ -287,7 +289,7 @@ async fn half_messages_of_one_network_leave_memory_to_others_and_end_at_their_de
     let request = request_as(&app, MODEST, "/sessions", &[("box", BOX)]);
     let opened = request.body(picture).send().await.unwrap();
     expect(opened, StatusCode::CREATED).await;
-    // Its own body may be held a moment longer than its answer takes.
+    // The memory of a frame's body may be freed a moment after its answer: hence `HELD` in addition.
     assert!(upload_bytes(&app).await <= UPLOADS / 2 + HELD);
     let mut ends = Vec::new();
     for mut stream in streams {
@@ -299,7 +301,7 @@ async fn half_messages_of_one_network_leave_memory_to_others_and_end_at_their_de
     }
     let took = began.elapsed();
     println!("{ends:?} after {took:?}");
-    // In the time of a message its rest did not come, or there was no memory for that.
+    // The rest of the message did not come in time (4408), or there was no memory for it (4503).
     assert!(
         ends.iter().all(|code| [4408, 4503].contains(code)),
         "{ends:?}"
@@ -330,7 +332,7 @@ async fn clients_that_fill_the_queue_leave_a_place_to_one_that_has_none() {
     for t in 1..=3 {
         let post = request_as(&app, MODEST, &format!("/sessions/{id}/frames"), &[]);
         let answer = post.body(pictures::png(t)).send().await.unwrap();
-        // It once was 503.
+        // Must not be 503.
         expect(answer, StatusCode::OK).await;
     }
     let second = heavy::post(&app, &heavy::open(&app).await, 2);
@@ -382,7 +384,7 @@ async fn posts_of_two_frames_do_not_wait_until_the_long_posts_of_another_client_
         long.spawn(post.header("x-forwarded-for", GREEDY).send());
     }
     let id = open(&app, MODEST).await;
-    // The long ones are at work when single frames wait for their turns.
+    // Waits until the long requests are at work.
     let busy = async {
         while app
             .get("/metrics")
@@ -403,8 +405,8 @@ async fn posts_of_two_frames_do_not_wait_until_the_long_posts_of_another_client_
     assert!(long.try_join_next().is_none(), "the long posts go on");
 }
 
-/// How long two large frames of a client took after refused posts of it that took no time; and of another client's
-/// frames beside them, how many there were, and the time of the slowest.
+/// Sends two large frames of a client, after posts of it that were refused at once; beside them, another client's
+/// frames. Returns the time of the large frames, and the number of the others with the time of the slowest.
 async fn beside_slow_frames(
     app: &TestApplication,
     (cheap, modest): (&str, &str),
@@ -450,7 +452,8 @@ async fn beside_slow_frames(
     (took, number, slowest)
 }
 
-/// A busy machine may stop any process for a while; a service whose workers are all held stalls each time.
+/// Tries several times: a busy machine may stop any process for a while, but a service without a free worker always
+/// stalls.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn slow_frames_among_cheap_refused_posts_hold_not_all_quick_workers() {
     let app = TestApplication::start_with(|config| {
@@ -484,12 +487,12 @@ async fn frames_of_a_client_that_sends_too_many_are_refused_and_change_nothing()
         let request = request_as(&app, client, &path, &[]);
         request.body(pictures::png(1)).send().await.unwrap()
     };
-    // One after the other: many at once could be refused like frames.
+    // Opened one after the other: many requests at once could be refused.
     let mut sessions = Vec::new();
     for _ in 0..48 {
         sessions.push(open(&app, GREEDY).await);
     }
-    // Each sends its next frame once it has an answer, until one was refused.
+    // Each session sends its next frame after the answer to the last one, until the service has refused one.
     let flood = async |id: String| {
         let mut frame = 0;
         loop {
@@ -527,7 +530,7 @@ async fn frames_of_a_client_that_sends_too_many_are_refused_and_change_nothing()
     assert_eq!(expect(view, StatusCode::OK).await["frames"], frame + 1);
 }
 
-/// Their frames were refused one by one, and the lines before the refusal were all that was left of the request.
+/// If the frames of a request were refused one by one, the lines before the refusal would be all that it gets.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn several_frames_of_a_request_wait_where_single_ones_are_refused() {
     const FRAMES: usize = 40;
@@ -573,7 +576,7 @@ async fn several_frames_of_a_request_wait_where_single_ones_are_refused() {
     assert!(!lines.contains("queue-full"), "{lines}");
 }
 
-/// Begins requests from this address, none of which ends, until a connection is refused.
+/// Opens connections from this address with requests that do not end, until one is refused.
 async fn hold_connections(app: &TestApplication, from: IpAddr) -> Vec<RawConnection> {
     let mut held = Vec::new();
     loop {
@@ -602,7 +605,7 @@ async fn the_share_of_connections_shrinks_with_each_address_and_the_next_one_sti
     for last in 1..=6 {
         held.push(hold_connections(&app, address(last)).await);
     }
-    // Four addresses once had all of them, and nobody else was answered.
+    // Each address gets half of what is free, up to its share, so that a few cannot take all connections.
     let counts: Vec<usize> = held.iter().map(Vec::len).collect();
     assert_eq!(counts, [8, 8, 8, 4, 2, 1]);
     let mut next = RawConnection::open_from(address(7), app.address).await;
@@ -610,7 +613,7 @@ async fn the_share_of_connections_shrinks_with_each_address_and_the_next_one_sti
     next.send(request).await;
     let answer = next.read_to_end().await;
     assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
-    // What is given back may be had again.
+    // Connections that an address has closed are free for others.
     held[0].clear();
     let mut later = Vec::new();
     while later.len() < 4 {

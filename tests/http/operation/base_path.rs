@@ -1,4 +1,4 @@
-//! The service below a path of a host that it shares with others.
+//! The service below a path (`--base-path`) of a host that it shares with other services.
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::pictures;
@@ -14,7 +14,7 @@ async fn start() -> TestApplication {
 #[tokio::test]
 async fn a_session_goes_on_where_its_location_says() {
     let app = start().await;
-    // With the path, and as it comes from a proxy that took the path off.
+    // With the base path, and as a proxy sends it that has removed the base path.
     for path in ["/video/tracker/sessions", "/sessions"] {
         let request = app.request(Method::POST, path, &[("box", BOX)]);
         let opened = request.body(pictures::png(0)).send().await.unwrap();

@@ -54,7 +54,7 @@ fn serves_answers_health_and_ends_on_sigterm() {
 
 #[test]
 fn every_request_has_its_line_in_the_log_when_the_service_has_ended() {
-    // Probes are logged at this level.
+    // Probes are logged at the level `debug`.
     let flags = ["--log-format", "json", "--log", "bagtrack=debug"];
     let service = Program::start(&flags, &[]);
     for _ in 0..3 {
@@ -72,12 +72,12 @@ fn every_request_has_its_line_in_the_log_when_the_service_has_ended() {
 #[tokio::test]
 async fn a_log_that_nobody_reads_stops_nothing_and_its_lost_lines_are_counted() {
     const REQUESTS: u64 = 6000;
-    // A trusted proxy that asks for itself may ask as often as it likes.
+    // Requests of a trusted proxy itself have no rate limit.
     let flags = ["--log-format", "json", "--trusted-proxies", "127.0.0.1"];
     let service = Program::start(&flags, &[]);
 
-    // From here on the pipe is open and nobody reads it. Each of these requests has a line in the log, together
-    // more than what the pipe and the service keep.
+    // From here on nobody reads the pipe of the log, which stays open. The requests have a line in the log each,
+    // together more than the buffers of the pipe and of the service hold.
     let client = Client::new();
     let nowhere = service.url("/nowhere");
     let all = async {
@@ -126,7 +126,7 @@ fn a_setting_out_of_its_range_is_named_in_one_line() {
         line,
         "bagtrack: --queue (BAGTRACK_QUEUE) must be from 1 to 2^61 - 1\n"
     );
-    // These were a panic and a backtrace.
+    // A message, and no panic with a backtrace.
     for flag in ["--queue", "--max-sessions"] {
         let mut command = bagtrack();
         let output = command.args(["serve", flag, "18446744073709551615"]);

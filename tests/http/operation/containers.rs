@@ -1,11 +1,11 @@
-//! The limits of the containers in `docker/`, against what the program says that it takes with their settings.
+//! The memory limits of the containers in `docker/`, against the memory that the program announces for their settings.
 #![cfg(unix)]
 
 use crate::program::Program;
 use std::path::Path;
 use std::process::Command;
 
-/// The text that stands between these two in a line that has the first.
+/// The text between `before` and the next `after`, in the line that has `before`.
 fn between<'a>(text: &'a str, before: &str, after: &str) -> &'a str {
     let rest = text
         .split_once(before)
@@ -13,7 +13,7 @@ fn between<'a>(text: &'a str, before: &str, after: &str) -> &'a str {
     rest.1.split(after).next().unwrap().trim().trim_matches('"')
 }
 
-/// The settings of the program in a file of compose or of the Helm chart that are plain values.
+/// The settings of the program in a file of compose or of the Helm chart, where they are plain values.
 fn settings(text: &str) -> Vec<(String, String)> {
     let lines = text
         .lines()
@@ -28,7 +28,7 @@ fn settings(text: &str) -> Vec<(String, String)> {
     pairs.collect()
 }
 
-/// The resident memory in MiB that the program promises with these settings.
+/// The most resident memory in MiB that the program announces for these settings.
 fn promised(settings: &[(String, String)], workers: &str) -> u64 {
     let variables = settings.iter().map(|(name, value)| (&**name, &**value));
     let variables: Vec<_> = variables.chain([("BAGTRACK_WORKERS", workers)]).collect();
@@ -39,7 +39,7 @@ fn promised(settings: &[(String, String)], workers: &str) -> u64 {
         .unwrap()
 }
 
-/// The bytes of memory over which an alert is sent.
+/// The threshold of the memory alert, in bytes.
 fn alerted(docker: &Path) -> f64 {
     let alerts = std::fs::read_to_string(docker.join("prometheus/alerts.yaml")).unwrap();
     let expression = "process_resident_memory_bytes{job=\"bagtrack\"} > ";
@@ -68,13 +68,13 @@ fn what_the_program_promises_fits_into_its_container_and_an_alert_comes_before_t
         let text = std::fs::read_to_string(docker.join(file)).unwrap();
         let settings = settings(&text);
         assert!(settings.len() >= 4, "{file}: {settings:?}");
-        // A worker for each processor that the container has.
+        // The program starts a worker for each processor of the container.
         let workers = between(&text, cpus, if unit == "g" { "\n" } else { "," });
         let limit = between(&text, memory, unit);
         let limit = limit.parse::<u64>().unwrap() << 10;
         let promised = promised(&settings, workers);
         assert!(promised < limit, "{file}: {promised} MiB of {limit}");
-        // More than was promised is an alert, and it comes before the container is killed.
+        // The alert must be above the announced memory, and below the limit at which the container is killed.
         let mib = alerted / f64::from(1 << 20);
         let range = promised as f64..limit as f64;
         assert!(range.contains(&mib), "{file}: {mib} MiB of {range:?}");
@@ -141,7 +141,7 @@ fn an_image_is_built_of_a_whole_workspace() {
         }
         for member in ["python", "sim"].map(|name| context.path().join(name)) {
             if !member.is_symlink() {
-                // The Dockerfile makes it.
+                // The Dockerfile makes an empty crate of this member.
                 std::fs::create_dir_all(member.join("src")).unwrap();
                 std::fs::write(member.join("src/lib.rs"), "").unwrap();
             }

@@ -1,4 +1,4 @@
-//! What is counted beside plain answers: lines, messages, connections that no handler sees; and readiness.
+//! Metrics of lines, of messages, and of connections that no handler sees; and readiness.
 
 use crate::application::{TestApplication, bound_bodies, expect, expect_detail};
 use crate::helpers::raw::RawConnection;
@@ -17,7 +17,7 @@ async fn lines_and_messages_count_as_sent() {
     let (app, id) = TestApplication::with_session().await;
     let sent = async || value(&metrics(&app).await, "bagtrack_sent_bytes_total", &[]);
     let frames = form((1..=60).map(|t| pictures::png(t % 20)));
-    // Its own answer is the only other one between two of these.
+    // Between two readings of the metrics, only the answer with the first reading is added.
     let own = metrics(&app).await.len();
     let before = sent().await;
     let request = app.frames_request(&id, &[]);
@@ -45,7 +45,7 @@ async fn an_address_has_a_share_of_the_connections_and_what_ends_before_a_handle
     let app = TestApplication::start_with(|config| {
         config.max_connections = 4;
         config.limits.client_connections = Some(2);
-        // A busy connection stays busy until the end, however slow the machine is.
+        // Long enough that, on a slow machine too, a busy connection stays busy until the end of the test.
         config.body_timeout = Duration::from_secs(600);
         config.limits.body_grace = Duration::from_secs(600);
     });
@@ -54,7 +54,7 @@ async fn an_address_has_a_share_of_the_connections_and_what_ends_before_a_handle
     for _ in 0..2 {
         busy.push(RawConnection::hold(app.address, "POST", "/sessions", 1000).await);
     }
-    // Kubernetes ends a service that does not answer this, which may come from an address that clients have, too.
+    // Kubernetes restarts a service that does not answer probes; they may come from an address that clients share.
     for probe in ["/healthz", "/readyz"] {
         expect(app.get(probe).await, StatusCode::OK).await;
     }
@@ -63,7 +63,7 @@ async fn an_address_has_a_share_of_the_connections_and_what_ends_before_a_handle
         .send("POST /sessions HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n")
         .await;
     expect_refusal(&refused.read_to_end().await);
-    // Of those that ask nothing a few may wait, and make room.
+    // A few connections without a request may stay, and make room for others.
     let mut silent = Vec::new();
     for _ in 0..40 {
         silent.push(RawConnection::open(app.address).await);
@@ -72,7 +72,7 @@ async fn an_address_has_a_share_of_the_connections_and_what_ends_before_a_handle
     let answers = join_all(silent.iter_mut().map(RawConnection::read_to_end)).await;
     assert!(answers.iter().all(String::is_empty), "{answers:?}");
     drop(busy.pop());
-    // Two idle ones, the first of which makes room, and this client's own.
+    // The open ones are two idle connections, the first of which makes room, and this client's own.
     let counted = async {
         loop {
             let _idle = RawConnection::open(app.address).await;
@@ -93,7 +93,7 @@ async fn an_address_has_a_share_of_the_connections_and_what_ends_before_a_handle
     assert!(refused >= 1.0, "{refused}");
 }
 
-/// That it is the answer to a connection over the share of its address.
+/// Checks that this is the answer to a connection beyond the share of its address.
 #[track_caller]
 fn expect_refusal(answer: &str) {
     assert!(answer.starts_with("HTTP/1.1 429"), "{answer}");

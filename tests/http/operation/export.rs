@@ -17,7 +17,7 @@ fn contains(bytes: &[u8], part: &[u8]) -> bool {
     bytes.windows(part.len()).any(|window| window == part)
 }
 
-// One thread waits for the end while another collects.
+// Two threads: one waits for the end of the service, the other runs the collector.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_span_of_a_request_is_exported_as_a_child_of_the_clients() {
     let received: Arc<Mutex<Vec<u8>>> = Arc::default();
@@ -40,7 +40,7 @@ async fn the_span_of_a_request_is_exported_as_a_child_of_the_clients() {
         "{answered}"
     );
     let span = u64::from_str_radix(&answered[36..52], 16).unwrap();
-    // A client that does not record its trace decides for the service.
+    // The service does not record a trace that the client has not sampled.
     let unrecorded = "00-aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa-00f067aa0ba902b7-00";
     let request = client.post(&url).header("traceparent", unrecorded);
     request.body(pictures::png(0)).send().await.unwrap();

@@ -1,4 +1,4 @@
-//! What the log tells, and what it does not.
+//! What the log contains, and what it must not contain.
 
 use crate::application::BOX;
 use crate::pictures;
@@ -23,14 +23,14 @@ async fn a_line_has_the_ids_once_no_full_session_id_and_probes_have_none() {
             .header("x-request-id", "the-request")
             .header("traceparent", format!("00-{trace}-00f067aa0ba902b7-01"));
         request.body("no image").send().await.unwrap();
-        // Its picture has no height, which once was a panic in the log for each.
+        // The picture's header has height 0, which must not panic.
         let mut jpeg = pictures::encode(pictures::scene(1), ImageFormat::Jpeg);
         let start = jpeg.windows(2).position(|two| two == [0xFF, 0xC0]).unwrap();
         jpeg[start + 5..start + 7].fill(0);
         let flat = client.post(service.url(&format!("/sessions/{id}/frames")));
         let flat = flat.body(jpeg).send().await.unwrap();
         assert_eq!(flat.status(), 422);
-        // Ids that are written in other ways are served or not, and never logged in full.
+        // Whether the service takes such spellings of an id or not, it must not log the id in full.
         let encoded = format!("/sessions/%{:02x}{}", id.as_bytes()[0], &id[1..]);
         for path in [encoded, format!("/sessions/{id};x=1")] {
             client.get(service.url(&path)).send().await.unwrap();
@@ -38,7 +38,7 @@ async fn a_line_has_the_ids_once_no_full_session_id_and_probes_have_none() {
         for path in ["/healthz", "/readyz", "/metrics"] {
             client.get(service.url(path)).send().await.unwrap();
         }
-        // Lines of 60 kB filled disks, 56 MB a second.
+        // A long method must not make a long line, which would fill disks.
         let odd = Method::from_bytes(&[b'A'; 6000]).unwrap();
         let odd = client.request(odd, service.url("/sessions"));
         assert_eq!(odd.send().await.unwrap().status(), 405);
@@ -110,7 +110,7 @@ async fn a_line_tells_the_client_and_the_name_of_its_key_but_not_the_key() {
         of("with-key")
     );
     assert!(!of("without").contains(r#""key""#), "{}", of("without"));
-    // A refused probe is named.
+    // A refused probe is logged.
     let probe = log.iter().find(|line| line.contains("/metrics"));
     assert!(probe.unwrap().contains("unauthorized"), "{probe:?}");
     let all = log.join("\n");

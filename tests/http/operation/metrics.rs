@@ -20,7 +20,7 @@ pub async fn metrics(app: &TestApplication) -> String {
     response.text().await.unwrap()
 }
 
-/// The first answer of `/readyz` that has this status.
+/// Polls `/readyz` until it answers with this status.
 pub async fn readiness(app: &TestApplication, status: StatusCode) -> Response {
     let answer = async {
         loop {
@@ -89,7 +89,7 @@ async fn requests_frames_problems_and_sizes_are_counted() {
         ),
         1.0
     );
-    // The first frame is decoded, too; the bad one is not.
+    // Decoded are the three tracked frames and the first one, but not the bad one.
     assert_eq!(times("bagtrack_frame_decode_seconds_count"), 4.0);
     assert_eq!(times("bagtrack_frame_step_seconds_count"), 3.0);
     assert!(times("bagtrack_frame_step_seconds_sum") > 0.0);
@@ -130,7 +130,7 @@ async fn services_in_one_process_count_for_themselves() {
 async fn the_dashboard_and_the_alerts_ask_for_metrics_that_there_are() {
     let app = TestApplication::start().await;
     let with_store = TestApplication::start_with(|config| {
-        // Nothing listens there.
+        // No store listens at this address.
         config.store.store = Some(Secret::from("redis://127.0.0.1:1"));
         config.store.store_timeout = Duration::from_millis(20);
     })
@@ -211,7 +211,7 @@ async fn readiness_ends_when_the_queue_is_full_and_comes_back_when_it_is_free() 
     .await;
     expect(app.get("/readyz").await, StatusCode::OK).await;
     let busy = heavy::fill_queue(&app).await;
-    // Between two of the long requests the place is free for a moment.
+    // Polls, because the place in the queue is free for a moment between two of the long requests.
     let not_ready = readiness(&app, StatusCode::SERVICE_UNAVAILABLE).await;
     expect_detail(not_ready, "not-ready", &["queue"]).await;
     drop(busy);

@@ -13,7 +13,7 @@ use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 use tokio::net::TcpListener;
 
-/// A request whose body never comes, and which is inside when this returns.
+/// A request whose body never comes. The service handles it when this function returns.
 async fn stuck(service: &Program) -> crate::helpers::raw::RawConnection {
     let target = "/sessions?box=1,2,3,4";
     crate::helpers::raw::RawConnection::hold(service.address, "POST", target, 1000).await
@@ -23,7 +23,7 @@ async fn stuck(service: &Program) -> crate::helpers::raw::RawConnection {
 async fn an_end_without_open_requests_has_status_0() {
     for (signal, flags) in [
         (Signal::TERM, &["--shutdown-delay", "0s"][..]),
-        // SIGINT leaves the delay out.
+        // SIGINT skips `--shutdown-delay`.
         (Signal::INT, &["--shutdown-delay", "10m"][..]),
     ] {
         let service = Program::start(flags, &[]);
@@ -79,7 +79,7 @@ async fn a_hangup_reads_the_keys_again() {
     service.signal(Signal::HUP);
     service.logs("the API keys stay as they were");
     assert_eq!(status("fedcba9876543210").await, StatusCode::OK);
-    // A pipe that nobody writes to once stopped this reload and all later ones.
+    // Reading a pipe without a writer must not block this reload, nor later ones.
     std::fs::remove_file(&file).unwrap();
     let made = Command::new("mkfifo").arg(&file).status();
     assert!(made.unwrap().success());
@@ -97,7 +97,7 @@ fn a_variable_that_is_no_setting_is_told_at_the_start() {
     let variables = [
         ("BAGTRACK_MAX_SESSION", "3"),
         ("BAGTRACK_MAX_SESSIONS", "3"),
-        // Kubernetes sets these beside a service that is called `bagtrack`.
+        // Kubernetes sets such variables for a service that is called `bagtrack`.
         ("BAGTRACK_SERVICE_HOST", "10.0.0.1"),
         ("BAGTRACK_PORT_8080_TCP", "tcp://10.0.0.1:8080"),
     ];
@@ -119,14 +119,14 @@ fn what_is_set_and_has_no_effect_is_told_at_the_start() {
         .iter()
         .any(|line| line.contains("no --store"));
     assert!(told, "{:?}", service.said());
-    // After it listens, since the program may take its time.
+    // The check of ffmpeg does not delay the start: its warning comes after the service listens.
     service.logs("true (--ffmpeg) is no ffmpeg");
 }
 
-/// It logged hundreds of lines a second, of each attempt to reach it.
+/// The client of the cluster may try hundreds of times a second; these attempts are not logged.
 #[test]
 fn a_cluster_that_is_away_is_told_once() {
-    // It is asked for at the start, before the service listens.
+    // The service asks for the cluster at the start, before it listens.
     let service = Program::start(&["--store", "redis-cluster://127.0.0.1:1"], &[]);
     service.signal(Signal::TERM);
     let told = service.said().to_vec();
@@ -137,7 +137,7 @@ fn a_cluster_that_is_away_is_told_once() {
     assert_eq!(lines().find(|line| line.contains("redis::cluster")), None);
 }
 
-/// What a key that leaked has made must not outlive it.
+/// When a leaked key is replaced, the tokens and streams made with it must end.
 #[tokio::test]
 async fn a_replaced_key_ends_its_tokens_and_streams_though_its_name_stays() {
     const OLD: &str = "0123456789abcdef";
@@ -187,7 +187,7 @@ async fn a_replaced_key_ends_its_tokens_and_streams_though_its_name_stays() {
     assert_eq!(new.message().await["frame"], 1);
 }
 
-/// Keys and certificates may be exchanged while the start waits for a store. A hangup ended the process then.
+/// Operators may exchange keys and certificates, and send SIGHUP, while the start waits for a store.
 #[tokio::test]
 async fn a_hangup_during_the_start_does_not_end_the_service() {
     let store = TcpListener::bind("127.0.0.1:0").await.unwrap();
@@ -199,7 +199,7 @@ async fn a_hangup_during_the_start_does_not_end_the_service() {
     command.arg(file.path()).stderr(Stdio::piped());
     let mut service = Process(command.spawn().unwrap());
     let log = service.0.stderr.take().unwrap();
-    // The start waits for an answer, which does not come.
+    // The start waits for an answer of the store, which does not come.
     let (asked, _) = within(store.accept(), "the store is asked").await.unwrap();
     service.signal(Signal::HUP);
     drop((asked, store));

@@ -39,7 +39,7 @@ async fn what_the_program_holds_is_compressed_for_clients_that_take_gzip() {
         assert_eq!(small.headers()["content-encoding"], "gzip", "{path}");
         assert_eq!(small.headers()["vary"], "accept-encoding", "{path}");
         assert_eq!(small.headers()["content-type"], kind);
-        // One tag for two encodings is a weak one.
+        // Both encodings have the same entity tag, so it must be a weak one.
         assert_eq!(small.headers()["etag"], tag);
         assert!(tag.starts_with("W/\""), "{tag}");
         let small = small.bytes().await.unwrap();

@@ -145,7 +145,7 @@ async fn a_raw_body_needs_no_right_content_type() {
         let response = request.send().await.unwrap();
         assert_eq!(response.status(), StatusCode::CREATED, "{media_type}");
     }
-    // What `curl -d '{...}'` sends.
+    // The label that `curl -d '{...}'` sends.
     let request = app.request(Method::POST, "/sessions", &[("box", BOX)]);
     let request = request.header("content-type", "application/x-www-form-urlencoded");
     let body = json!({"frame": base64(pictures::png(0))}).to_string();
@@ -327,10 +327,10 @@ async fn a_file_that_curl_sent_as_text_is_recognised() {
         request.body(body).send().await.unwrap()
     };
     expect_detail(send(stripped).await, "frame-damaged", &["--data-binary"]).await;
-    // The `@` was left out.
+    // The user left out the `@` before the name of the file.
     let name = send(b"clip/img/0001.jpg".to_vec()).await;
     expect_detail(name, "unsupported-image", &["text", "`-F frame=@file`"]).await;
-    // Base64 loses its line breaks, too, and is whole without.
+    // Base64 text without its line breaks, as curl sends it, is still complete.
     let text = BASE64_STANDARD.encode(&frame);
     let lines: Vec<&[u8]> = text.as_bytes().chunks(76).collect();
     let url = format!("data:image/png;base64,{text}").into_bytes();

@@ -1,4 +1,4 @@
-//! Bodies are what their bytes are, whatever their labels say.
+//! The bytes of a body decide on its type, whatever its `Content-Type` says.
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::pictures;

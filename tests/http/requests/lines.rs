@@ -11,7 +11,7 @@ use std::time::Duration;
 
 pub const LINES: &str = "application/x-ndjson";
 
-/// The lines of an answer, each of which has an end.
+/// The lines of an answer; the last one must end with a line break, too.
 pub async fn lines(response: Response) -> Vec<Value> {
     let status = response.status();
     let media_type = response.headers()["content-type"].clone();
@@ -81,7 +81,7 @@ async fn frames_before_a_bad_one_count_and_its_problem_is_the_last_line() {
     assert_eq!(last["instance"], format!("/sessions/{id}/frames"));
     assert_eq!(app.frames_of(&id).await, 4);
 
-    // Sent again as it should be: what was answered is answered again, and the rest is tracked.
+    // Sent again without the fault: answered frames get their stored answers, and the rest is tracked.
     let mut got = lines(post(&app, &id, &[("frame", "1")], frames(1..=6)).await).await;
     for answer in &mut got[..3] {
         let replayed = answer.as_object_mut().unwrap().remove("replayed");
@@ -121,7 +121,7 @@ async fn the_pixels_of_all_frames_together_are_bounded() {
 
 #[tokio::test]
 async fn the_processor_time_of_all_frames_together_is_bounded() {
-    // More than a frame of these takes, and less than all of them.
+    // More time than one of these frames takes, and less than all of them take.
     let app = TestApplication::start_with(|config| {
         config.limits.max_request_cpu = Duration::from_millis(300);
         config.max_frames = 400;
@@ -133,7 +133,7 @@ async fn the_processor_time_of_all_frames_together_is_bounded() {
     let last = got.pop().unwrap();
     assert_eq!(last["type"], "/docs/problems#request-too-costly");
     let detail = last["detail"].as_str().unwrap();
-    // Of a whole request it says that none was tracked.
+    // Without lines, the text says instead that no frame was tracked.
     let cure = "Send fewer or smaller frames in a request. The lines before this one count.";
     assert!(detail.ends_with(cure), "{detail}");
     assert!((1..400).contains(&got.len()), "{} lines", got.len());
@@ -141,7 +141,7 @@ async fn the_processor_time_of_all_frames_together_is_bounded() {
 
 #[tokio::test]
 async fn the_last_frame_has_to_be_tracked_in_the_time_of_one_request() {
-    // Each frame takes some hundredths of that.
+    // A frame takes some hundredths of this time.
     let app = TestApplication::start_with(|config| {
         config.limits.max_request_cpu = Duration::from_secs(600);
         config.work_timeout = Duration::from_secs(1);
@@ -153,7 +153,7 @@ async fn the_last_frame_has_to_be_tracked_in_the_time_of_one_request() {
             let session = heavy::open(&app).await;
             let request = heavy::post(&app, &session, 2 * heavy::FRAMES);
             let answer = request.header("accept", LINES).send().await.unwrap();
-            // On a busy machine the first frame may take that time, too.
+            // On a busy machine, the first frame alone may take this time: try again.
             if answer.status() == StatusCode::OK {
                 break (session, answer);
             }
@@ -164,7 +164,7 @@ async fn the_last_frame_has_to_be_tracked_in_the_time_of_one_request() {
     let mut got = lines(answer).await;
     let last = got.pop().unwrap();
     assert_eq!(last["type"], "/docs/problems#work-timeout", "{last}");
-    // The frame at work may have ended without its line.
+    // The frame that was at work may be tracked, although its line is missing.
     let view = expect(app.get(&session).await, StatusCode::OK).await;
     let tracked = view["frames"].as_u64().unwrap() - 1;
     assert!((0..=1).contains(&(tracked - got.len() as u64)), "{tracked}");

@@ -28,7 +28,7 @@ async fn a_file_under_another_name_is_told_to_be_called_frame() {
             expect_detail(refused, "missing-frame", &texts).await;
         }
     }
-    // A file may hold a setting.
+    // A setting may be uploaded as a file, too.
     let settings = Part::bytes(br#"{"alpha": 0.25}"#.to_vec()).file_name("parameters.json");
     let frame = Part::bytes(pictures::png(0)).file_name("first.png");
     let form = Form::new()
@@ -66,7 +66,7 @@ async fn a_box_under_another_name_or_in_another_place_is_led_to_its_own() {
     assert_eq!(app.frames_of(&id).await, 1);
 }
 
-/// The first bytes of files as phones make them.
+/// The first bytes of image files as phones make them.
 const HEIC: &[u8] = b"\0\0\0\x24ftypheic\0\0\0\0mif1MiHEMiPrmiafMiHBheic\0\0\x0d\x5bmeta\0\0\0\0";
 const AVIF: &[u8] = b"\0\0\0\x20ftypavif\0\0\0\0avifmif1miafMA1B\0\0\0\xf2meta\0\0\0\0";
 
@@ -143,12 +143,12 @@ async fn a_box_that_reaches_far_outside_is_tracked_with_a_warning() {
     stream.say(r#"{"box": [90, 20, 20, 12]}"#).await;
     stream.send(pictures::png(2)).await;
     has_warning(&stream.message().await);
-    // A box on the frame has none, nor has a plain answer.
+    // Without a box beyond the frame there is no warning.
     let plain = app.opened(&[("box", BOX)]).await;
     assert_eq!(plain.get("warnings"), None, "{plain}");
     let answer = app.track(id, 3).await;
     assert_eq!(answer.get("warnings"), None, "{answer}");
-    // It may be two corners, and may be a large box.
+    // The numbers may be two corners, or a large box: so a warning.
     let doubtful = [("box", "40,30,58,44")];
     let created = app.opened(&doubtful).await;
     let warning = created["warnings"][0].as_str().unwrap();

@@ -1,4 +1,4 @@
-//! What a request may look like: its form, its labels, its body; and answers as lines.
+//! The forms, labels and bodies of requests, and answers as lines.
 
 pub mod compressed;
 pub mod forms;

@@ -1,4 +1,4 @@
-//! A fault of multer, and that forms are read without it. See docs/upstream/multer.md.
+//! A fault of the crate multer, and that the service is not affected by it. See docs/upstream/multer.md.
 
 use crate::application::{TestApplication, expect_problem};
 use crate::helpers::raw::RawConnection;
@@ -13,12 +13,12 @@ use std::task::Poll;
 
 const PIECE: &[u8] = b"xxxx";
 
-/// Seconds of this thread's processor time that multer takes for so many pieces before the first part, which come one
-/// by one.
+/// Seconds of this thread's processor time that multer takes for this number of pieces before the first part, given
+/// one by one.
 fn multer_alone(pieces: usize) -> f64 {
     let look = || {
         let (mut left, mut comes) = (pieces, false);
-        // Each piece comes after the parser has done what it can with those before it.
+        // `Pending` before each piece, so that the parser works on the pieces so far.
         let body = futures_util::stream::poll_fn(move |cx| {
             comes = !comes;
             if !comes {
@@ -36,7 +36,7 @@ fn multer_alone(pieces: usize) -> f64 {
     cpu_time::medians(3, vec![Box::new(look)])[0]
 }
 
-/// When this fails multer has been mended: then `Stepwise` and the limit of heads in `multipart.rs` can go.
+/// If this test fails, multer no longer has the fault: remove `Stepwise` and the limit of heads in `multipart.rs`.
 #[test]
 fn multer_alone_looks_through_all_that_it_has_for_each_piece() {
     let (short, long) = (multer_alone(16_000), multer_alone(64_000));
@@ -44,12 +44,12 @@ fn multer_alone_looks_through_all_that_it_has_for_each_piece() {
     assert!(long > 7.0 * short, "{short} s and {long} s: in proportion?");
 }
 
-/// Seconds of the service's processor time for a form with a file of so many bytes, in pieces of four.
+/// Seconds of the service's processor time for a form with a file of this many bytes, sent in pieces of four.
 async fn cost(service: &Program, bytes: usize) -> f64 {
     let head = "POST /sessions?box=1,1,9,9 HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\
         Content-Type: multipart/form-data; boundary=b\r\nTransfer-Encoding: chunked\r\n\r\n";
     let part = b"--b\r\nContent-Disposition: form-data; name=\"frame\"; filename=\"a\"\r\n\r\n";
-    // Its lines begin as the boundary does.
+    // Each line of the file begins like the boundary.
     let file = b"\r\n--a".iter().copied().cycle().take(bytes);
     let form: Vec<u8> = part
         .iter()
@@ -81,7 +81,7 @@ async fn a_form_in_pieces_of_four_bytes_takes_time_in_proportion_to_its_size() {
         cost(&service, 4 << 20).await,
     );
     println!("{short:.2} and {long:.2} s");
-    // Eight times the bytes; 64 times as much where each piece is looked through with all before it.
+    // The long file has eight times the bytes; if each piece were searched with all before it, it would cost 64 times.
     assert!(long < 20.0 * short.max(0.05), "{short} s and {long} s");
 }
 

@@ -1,4 +1,4 @@
-//! What bodies hold while they arrive: memory as far as they have come, and no place in the queue.
+//! While a body arrives, it takes memory for the bytes received so far, and no place in the queue.
 
 use crate::application::{TestApplication, behind_a_proxy, bound_bodies, expect, expect_problem};
 use crate::helpers::raw::RawConnection;
@@ -19,7 +19,7 @@ async fn bodies_that_are_announced_and_never_sent_close_the_service_to_nobody() 
     let app = TestApplication::start_with(behind_a_proxy).await;
     let id = app.open().await;
     let mut held = Vec::new();
-    // More than there are places in the queue, and with more bytes than all uploads may have.
+    // More bodies than places in the queue, which announce more bytes than all uploads may take.
     for client in 1..=5 {
         for which in 0..60 {
             let length = match which % 3 {
@@ -75,7 +75,7 @@ async fn json_counts_with_the_copies_that_parsing_makes() {
     expect(response, StatusCode::OK).await;
 }
 
-/// A video over a usual line: it had 30 seconds in all.
+/// For example a video over a usual line.
 #[tokio::test]
 async fn a_large_body_that_comes_steadily_has_more_time_than_a_small_one() {
     const PIECE: usize = 64 << 10;
@@ -99,8 +99,8 @@ async fn a_large_body_that_comes_steadily_has_more_time_than_a_small_one() {
     expect(answer.unwrap(), StatusCode::OK).await;
 }
 
-/// A service whose bodies have to come fast, but may take long in all: that ends with the same answer, so it must not
-/// be what ends these.
+/// A service with a high least rate of bodies, and a long time for a whole body: both limits end with the same answer,
+/// and only the first one is to be tested.
 async fn with_a_high_least_rate() -> TestApplication {
     let app = TestApplication::start_with(|config| {
         config.body_timeout = Duration::from_secs(600);
@@ -121,7 +121,7 @@ async fn a_body_slower_than_the_least_rate_is_408_in_every_form() {
     assert_eq!(app.frames_of(&id).await, 1);
 }
 
-/// The rest of it was waited for until the deadline of the largest body.
+/// Reading the rest of a refused body must not last until the deadline of the largest body.
 #[tokio::test]
 async fn the_rest_of_a_refused_body_has_the_same_least_rate() {
     let app = with_a_high_least_rate().await;

@@ -10,7 +10,7 @@ use std::time::{Duration, SystemTime};
 const ANN: &str = "0123456789abcdef";
 const BEN: &str = "fedcba9876543210";
 
-/// A service with these two, in the name of the first.
+/// A service with the keys of two clients; requests are made with that of the first.
 async fn two_clients() -> TestApplication {
     TestApplication::start_with(|config| {
         config.access.api_keys = vec![
@@ -54,7 +54,7 @@ async fn nothing_is_done_without_a_valid_key() {
             expect_problem(response, "unauthorized").await;
         }
     }
-    // Two keys are none.
+    // Two keys in one request do not count as a key.
     app.key = Some(ANN.to_owned());
     let request = app.request(Method::GET, &format!("/sessions/{id}"), &[]);
     expect_problem(
@@ -62,7 +62,7 @@ async fn nothing_is_done_without_a_valid_key() {
         "unauthorized",
     )
     .await;
-    // Probes and pages for people need none.
+    // Probes and the pages for people need no key.
     app.key = None;
     for path in ["/healthz", "/readyz", "/", "/docs/", "/openapi.json"] {
         assert_eq!(app.get(path).await.status(), StatusCode::OK, "{path}");
@@ -71,7 +71,7 @@ async fn nothing_is_done_without_a_valid_key() {
     assert_eq!(app.frames_of(&id).await, 1);
 }
 
-/// All of these once had one text, whose cure was that of another mistake.
+/// Each mistake has a text of its own, with its own cure.
 #[tokio::test]
 async fn what_is_wrong_with_a_key_is_told() {
     let mut app = two_clients().await;
@@ -112,7 +112,7 @@ async fn a_session_is_not_there_for_other_clients() {
     expect_problem(token.send().await.unwrap(), "session-not-found").await;
     app.key = Some(ANN.to_owned());
     assert_eq!(app.frames_of(&id).await, 1);
-    // Nor are others told that it has expired.
+    // Other clients are not told that the session has expired, either.
     app.clock.advance(Duration::from_secs(600));
     expect_problem(app.get_session(&id).await, "session-expired").await;
     app.key = Some(BEN.to_owned());
@@ -176,7 +176,7 @@ async fn before_1970_answers_tell_the_first_moment_that_dates_have() {
     let created = create.body(pictures::png(0)).send().await.unwrap();
     let created = expect(created, StatusCode::CREATED).await;
     let session = format!("{url}/{}", created["id"].as_str().unwrap());
-    // A panic in the formatting of dates once made 500 of these.
+    // Such dates must not panic in formatting, and so give 500.
     let view = expect(client.get(&session).send().await.unwrap(), StatusCode::OK).await;
     assert!(
         view["expires_at"].as_str().unwrap().starts_with("1970-"),

@@ -25,12 +25,13 @@ fn token(key: &IssuerKey, subject: &str) -> String {
     key.sign(&json!({ "iss": ISSUER, "aud": AUDIENCE, "sub": subject, "exp": expires.as_secs() }))
 }
 
-/// The file of the key set of an issuer with this key.
+/// Writes the key set of an issuer with this key to a file.
 fn write_keys(key: &IssuerKey, file: &Path) {
     std::fs::write(file, key_set(&[key])).unwrap();
 }
 
-/// A service that takes the tokens of this key, and is called with one of Ann's. The folder has the key set.
+/// A service that accepts tokens signed by this key; requests are made with a token of Ann's. The folder has the key
+/// set.
 async fn signed_in() -> (TempDir, IssuerKey, TestApplication) {
     let (folder, key) = (tempfile::tempdir().unwrap(), IssuerKey::p256("1"));
     let file = folder.path().join("keys.json");
@@ -55,7 +56,7 @@ async fn a_session_belongs_to_the_subject_of_the_token_that_opened_it() {
     let (_folder, key, mut app) = signed_in().await;
     let id = app.open().await;
     app.track(&id, 1).await;
-    // A later token of hers is as good.
+    // Another token of Ann's gives access to the same session.
     app.key = Some(token(&key, "ann"));
     app.track(&id, 2).await;
     for other in [token(&key, "ben"), KEY.to_owned()] {
@@ -81,7 +82,8 @@ async fn a_token_that_has_ended_is_told_so_and_ends_its_stream() {
     stream.send(pictures::png(1)).await;
     assert_eq!(stream.message().await["frame"], 1);
 
-    // The clocks of the two may be a minute apart. No stream could be opened in that minute.
+    // The clocks of service and issuer may differ by a minute: in the minute after its expiry, the token is still good,
+    // for streams too.
     app.clock.advance(Duration::from_secs(65));
     drop(stream);
     let opened = StreamClient::try_open(app.address, &id, "", &headers).await;
@@ -96,7 +98,7 @@ async fn a_token_that_has_ended_is_told_so_and_ends_its_stream() {
     stream.send(pictures::png(3)).await;
     assert_eq!(problem_slug(&stream.message().await), "unauthorized");
     assert_eq!(stream.close_code().await, 4401);
-    // What she gave a page is good for its own time.
+    // A session token that Ann gave to a page has a lifetime of its own.
     app.key = Some(token);
     app.track(&id, 3).await;
 }

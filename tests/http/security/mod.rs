@@ -1,4 +1,4 @@
-//! Who may call, from where, and over which line.
+//! Access: keys and tokens, origins and hosts, HTTPS.
 
 pub mod access;
 #[cfg(feature = "tls")]

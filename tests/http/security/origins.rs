@@ -1,4 +1,4 @@
-//! Pages of other origins, other hosts, and what browsers are told.
+//! Pages of other origins, other hosts, and the security headers for browsers.
 
 use crate::application::{BOX, TestApplication, expect, expect_detail, expect_problem};
 use crate::pictures;
@@ -23,7 +23,7 @@ async fn a_page_of_another_origin_opens_no_session() {
         let refused = open(&[("origin", origin), ("sec-fetch-site", "cross-site")]).await;
         expect_problem(refused, "origin-not-allowed").await;
     }
-    // The service's own page, also behind a proxy that names another host; and programs.
+    // Accepted: the service's own page, also behind a proxy that names another host; and programs.
     expect(open(&[("origin", &own)]).await, StatusCode::CREATED).await;
     let proxied = [("origin", ELSEWHERE), ("sec-fetch-site", "same-origin")];
     expect(open(&proxied).await, StatusCode::CREATED).await;
@@ -148,7 +148,7 @@ async fn a_service_for_this_machine_alone_is_not_served_under_a_rebound_name() {
     let rebound = format!("rebound.example:{port}");
     let refused = open(&rebound).await;
     expect_detail(refused, "host-not-allowed", &["--allowed-hosts"]).await;
-    // With keys, a page that rebinds its name cannot call; a proxy may name any host.
+    // With API keys, DNS rebinding gives a page no access; a trusted proxy may name any host.
     let keys = TestApplication::start_with(|config| {
         config.access.api_keys = vec![bagtrack::http::Secret::from("me:0123456789abcdef")];
     });

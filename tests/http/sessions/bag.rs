@@ -13,7 +13,7 @@ async fn sheet(app: &TestApplication, id: &str) -> RgbImage {
     image::load_from_memory(&bytes).unwrap().to_rgb8()
 }
 
-/// The brightness of the mean of the first entry, from its left to its right half.
+/// The mean brightness of the left and the right half of the first entry's mean vector.
 fn halves(sheet: &RgbImage) -> [f64; 2] {
     [4..36, 36..68].map(|columns| {
         let pixels = columns.flat_map(|x| (4..60).map(move |y| (x, y)));
@@ -37,7 +37,7 @@ async fn the_sheet_has_a_row_for_each_subspace_and_shows_the_target() {
     // Two entries more, each 64 pixels high with a gap of 4.
     assert_eq!(after.height(), before.height() + 2 * 68);
     assert_eq!(before.height(), 4 + 68);
-    // The target of the scene: its mean is no flat gray, and brighter where the scene is.
+    // The mean vector shows the target: it is brighter in the half in which the scene is.
     let target = pictures::scene(0);
     let bright = |columns: std::ops::Range<u32>| {
         let pixels = columns.flat_map(|x| (15..27).map(move |y| (x, y)));

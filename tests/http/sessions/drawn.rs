@@ -59,7 +59,7 @@ async fn the_picture_has_the_box_and_the_particles_and_the_header_the_answer() {
             "{answer}"
         );
     }
-    // Sent again, the answer is the stored one, and what the tracker saw is not known any more.
+    // A frame that is sent again gets the stored answer, which has no particles to draw.
     let number = [("frame", "3")];
     let again = drawn(&app, &id, &number, 3).await;
     assert_eq!(again.headers()["replayed"], "true");
@@ -138,7 +138,7 @@ async fn a_large_frame_is_drawn_smaller_with_its_box_in_place() {
 async fn a_frame_of_another_size_is_refused_before_it_is_decoded() {
     let (app, id) = TestApplication::with_session().await;
     let path = format!("/sessions/{id}/frames");
-    // Whoever decodes this one finds the damage first.
+    // If the service decoded this file, the problem would be the damage.
     let mut damaged = pictures::png_of(64, 48);
     let middle = damaged.len() / 2;
     damaged[middle] ^= 0xFF;

@@ -25,11 +25,11 @@ async fn a_session_expires_when_it_is_not_used() {
         expires_at = now;
     }
     app.clock.advance(ALMOST);
-    // Looking at it is no use.
+    // Reading the session does not keep it alive.
     expect(app.get_session(&id).await, StatusCode::OK).await;
     assert!(!app.snapshot(&id).await.is_empty());
     app.clock.advance(IDLE - ALMOST);
-    // It is told for a while that there was one; of others nothing is known.
+    // For a while the service says of this id that the session has expired; other ids are unknown.
     let late = app.post_frame(&id, pictures::png(4)).await;
     expect_problem(late, "session-expired").await;
     expect_problem(app.get_session(&id).await, "session-expired").await;

@@ -64,7 +64,7 @@ async fn the_box_follows_the_target() {
             "frame {t}: {answered:?} for {target:?}"
         );
     }
-    // A box that never moves is right in the first frames and has lost the target in these.
+    // The target has left its first box by these frames, so a box that never moves would fail.
     let (first, last) = (
         Rect::new(20.0, 15.0, 16.0, 12.0),
         Rect::new(52.0, 31.0, 16.0, 12.0),

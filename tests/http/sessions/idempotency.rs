@@ -101,12 +101,12 @@ async fn without_api_keys_each_address_has_keys_of_its_own() {
         request.send().await.unwrap()
     };
     let one = id_of(open("198.51.100.1", "key", 0).await).await;
-    // The same request, and another one under the same key: both are the other client's own.
+    // Keys of one client do not affect those of another, with the same request or a different one.
     let other = id_of(open("198.51.100.2", "key", 0).await).await;
     assert_ne!(one, other);
     id_of(open("198.51.100.3", "key", 1).await).await;
     assert_eq!(id_of(open("198.51.100.1", "key", 0).await).await, one);
-    // A client that has its share of sessions is refused before its frame is looked at.
+    // A client with its full share of sessions is refused before its frame is read.
     let request = app.request(Method::POST, "/sessions", &[("box", BOX)]);
     let request = request
         .header("idempotency-key", "new")

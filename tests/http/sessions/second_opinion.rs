@@ -7,7 +7,7 @@ use reqwest::StatusCode;
 use serde_json::Value;
 use std::path::Path;
 
-/// A service with the network in `folder`, asked always or in doubt alone.
+/// A service with the network in `folder`, used in each frame or in doubtful ones only.
 async fn with_network(folder: &Path, in_doubt: bool) -> TestApplication {
     let model = tiny_network::write(folder).unwrap();
     TestApplication::start_with(|config| {

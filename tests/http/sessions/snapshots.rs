@@ -1,4 +1,4 @@
-//! A session carried to another instance.
+//! Moving a session to another instance by a snapshot.
 
 use crate::application::{BOX, TestApplication, expect, expect_detail, expect_problem};
 use crate::helpers::forged;
@@ -18,7 +18,7 @@ type Answered = (Fingerprint, Option<Rect>, Estimate);
 const OLD: &str = "the secret of last year";
 const NEW: &str = "the secret of this year";
 
-/// A service with these secrets.
+/// A service with these snapshot secrets.
 async fn with_secrets(secrets: &[&str]) -> TestApplication {
     let secrets = secrets.iter().copied().map(Secret::from).collect();
     TestApplication::start_with(|config| config.access.snapshot_keys = secrets).await
@@ -50,7 +50,7 @@ async fn a_session_goes_on_elsewhere_bit_for_bit() {
     assert_eq!(restored["box"], view["answer"]["box"]);
     assert_eq!(restored["parameters"], view["parameters"]);
 
-    // The last frame can be asked for again there, too.
+    // The last frame can be sent again at the new instance, too, and gets its stored answer.
     let again = there.post_numbered(new_id, 11, pictures::png(11)).await;
     assert_eq!(again.headers()["replayed"], "true");
     assert_eq!(expect(again, StatusCode::OK).await, view["answer"]);
@@ -134,7 +134,7 @@ async fn a_snapshot_is_taken_from_services_with_the_same_secret_only() {
     }
 }
 
-/// A tracker's own snapshot, from a page or a program, goes on where unsigned ones are taken, and only there.
+/// The snapshot of a tracker in a page or a program opens a session only where unsigned snapshots are accepted.
 #[tokio::test]
 async fn a_tracker_goes_on_in_a_service_that_takes_unsigned_snapshots() {
     let frame = |t| {

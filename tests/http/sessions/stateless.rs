@@ -23,7 +23,7 @@ fn track(app: &TestApplication, query: &[(&str, &str)]) -> RequestBuilder {
     app.request(Method::POST, "/track", query)
 }
 
-/// Without the snapshot, which differs from a session's answer.
+/// The answer without its snapshot, to compare it with a session's answer.
 fn answer(tracked: &Value) -> Value {
     let mut answer = tracked.clone();
     answer.as_object_mut().unwrap().remove("snapshot");
@@ -58,7 +58,7 @@ async fn snapshots_between_two_services_give_the_boxes_of_a_session() {
         .unwrap();
     let opened = expect(apps[1].create(bytes, &[]).await, StatusCode::CREATED).await;
     assert_eq!(opened["frame"], 7);
-    // Nothing is kept: the same request gets the same answer.
+    // The service keeps no state: the same request gets the same answer.
     assert_eq!(
         step(&apps[0], &tracked, 8).await,
         step(&apps[1], &tracked, 8).await

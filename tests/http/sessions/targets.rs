@@ -44,7 +44,7 @@ async fn all_targets_are_tracked_and_the_first_as_if_it_were_alone() {
         assert_eq!(answer_of(&answer, 0), alone);
         assert_ne!(answer_of(&answer, 1), alone);
     }
-    // What stands still is found where it was; the target of the scene has moved 24 pixels.
+    // The two places behind stand still; the target of the scene has moved 24 pixels.
     let view = expect(app.get_session(id).await, StatusCode::OK).await;
     assert_eq!(view["frames"], 13);
     let x = |k: usize| view["answer"]["targets"][k]["box"]["x"].as_f64().unwrap();
@@ -116,7 +116,7 @@ async fn boxes_that_cannot_be_tracked_are_refused_and_named() {
     ] {
         expect_detail(create(query).await, slug, &[says]).await;
     }
-    // Sixteen with the usual parameters have room; with very large ones they have not.
+    // The memory of a session suffices for sixteen targets with the default parameters, not with very large ones.
     let sixteen = vec![BOX; 16].join(";");
     expect(create(&[("boxes", &sixteen)]).await, StatusCode::CREATED).await;
     let large = r#"{"patch_width": 64, "patch_height": 64, "bag_size": 32, "basis_dim": 6}"#;
@@ -156,7 +156,7 @@ async fn a_session_counts_once_for_each_target() {
     expect_problem(create("20,15,16,12;40,30,18,14").await, "quota-exceeded").await;
     app.delete_session(&id).await;
     expect(create("20,15,16,12;40,30,18,14").await, StatusCode::CREATED).await;
-    // Another time it would not be taken either.
+    // More targets than a client may ever have: no `quota-exceeded`, since trying again would not help.
     let five = [BOXES, "20,15,16,12;40,30,18,14"].join(";");
     expect_detail(create(&five).await, "invalid-parameter", &["at most 4"]).await;
 }

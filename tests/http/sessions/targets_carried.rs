@@ -50,7 +50,7 @@ async fn a_forged_number_of_targets_is_refused() {
         let other = forged::with_content(&snapshot, &content);
         expect_problem(app.create(other, &[]).await, "invalid-snapshot").await;
     }
-    // Each target twice: well formed but for the answers, which are of three targets.
+    // Has each target twice. All is well formed, but the stored answers have three targets only.
     let (first, rest): (&[u8], _) = postcard::take_from_bytes(&content[1..]).unwrap();
     assert!(!rest.is_empty());
     let first = postcard::to_stdvec(first).unwrap();
@@ -93,7 +93,7 @@ async fn a_stream_answers_for_all_targets_and_corrects_one() {
     assert_eq!(corrected["targets"][1]["box"]["x"], 42.0);
     assert_eq!(corrected["frame"], 4);
     stream.close().await;
-    // After a broken line the stored answers come again.
+    // After a broken connection, the stored answers come again.
     let mut stream = StreamClient::open(app.address, &id, "?from=4").await;
     let mut again = stream.message().await;
     assert_eq!(again["replayed"].take(), true);

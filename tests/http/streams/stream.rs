@@ -53,7 +53,7 @@ async fn a_box_before_a_frame_corrects_the_target() {
         (Some(1), Some(1.0))
     );
     assert_eq!(stream.message().await["frame"], 2);
-    // A frame that is sent as text is told at once: nothing else would come.
+    // A frame sent as text is answered by a problem at once: otherwise the client would wait for an answer forever.
     stream.say(&"A".repeat(5000)).await;
     let as_text = stream.message().await;
     assert_eq!(problem_slug(&as_text), "malformed-request");
@@ -61,7 +61,7 @@ async fn a_box_before_a_frame_corrects_the_target() {
         as_text["detail"].as_str().unwrap().contains("binary"),
         "{as_text}"
     );
-    // What cannot be read is told, whatever comes after it, and so are two targets of one frame.
+    // A bad header is a problem even if a good one follows, and so are headers for two targets of one frame.
     for earlier in [r#"{"box": 1}"#, r#"{"see": true, "target": 1}"#] {
         stream.say(earlier).await;
         stream.say(r#"{"box": [22, 16, 16, 12]}"#).await;
@@ -90,11 +90,11 @@ async fn what_the_tracker_saw_is_told_where_it_is_asked_for() {
     );
     let sum: f64 = particles.iter().map(|particle| particle[3]).sum();
     assert!((0.5..=1.001).contains(&sum), "{sum}");
-    // The likeliest one is where the answer is, at (22, 16) with 16 x 12 pixels.
+    // The likeliest particle is near the middle of the answered box, at (22, 16) with 16 x 12 pixels.
     let [x, y, width, _] = particles[0];
     assert!((x - 30.0).abs() < 3.0 && (y - 22.0).abs() < 3.0 && (width - 16.0).abs() < 3.0);
     assert!((votes.iter().sum::<f64>() - 1.0).abs() < 0.01, "{votes:?}");
-    // To look changes nothing, and is asked for each time.
+    // `see` does not change the answer, and applies to one frame only.
     let answer = answer.as_object_mut().unwrap();
     answer.retain(|name, _| name != "particles" && name != "votes");
     assert_eq!(Value::Object(answer.clone()), expected[0]);
@@ -140,7 +140,7 @@ async fn after_a_broken_line_nothing_is_lost_and_nothing_tracked_twice() {
     for t in 1..=8 {
         stream.send(pictures::png(t)).await;
     }
-    // Some answers come, others are on their way when the line breaks.
+    // The connection breaks after two answers, while others are in flight.
     let mut answers = vec![stream.message().await, stream.message().await];
     line.cut();
     while let Received::Message(answer) = stream.receive().await {
@@ -163,7 +163,7 @@ async fn after_a_broken_line_nothing_is_lost_and_nothing_tracked_twice() {
     assert_eq!(answers, expected);
     assert_eq!(app.frames_of(&id).await, 13);
 
-    // What is asked for must be known. The stream that is there goes on.
+    // `from` must name a stored answer. A refused stream does not end the present one.
     for (query, next) in [("?from=14", 13), ("?from=99", 13)] {
         let refused = StreamClient::try_open(app.address, &id, query, &[]).await;
         let response = refused.err().expect("a refusal");
@@ -207,7 +207,7 @@ async fn the_newest_frame_wins_where_that_is_asked_for() {
     }
     assert_eq!(answered + skipped, 60);
     assert_eq!(app.frames_of(&id).await, answered + 1);
-    // A number would be wrong as soon as a frame is skipped.
+    // Live streams refuse numbers, which would be wrong after the first skipped frame.
     stream.say(r#"{"frame": 1}"#).await;
     stream.send(pictures::png(1)).await;
     assert_eq!(problem_slug(&stream.message().await), "malformed-request");
@@ -294,7 +294,7 @@ async fn a_stream_has_the_quotas_and_limits_of_posts() {
     let app = TestApplication::start_with(|config| config.limits.client_frame_rate = 100).await;
     let id = app.open().await;
     let mut stream = StreamClient::open(app.address, &id, "").await;
-    // More than the 100 that may come at once, the first one included: the others wait until they may.
+    // More than the 100 frames that may come at once, the first one included: the rest is delayed by the rate limit.
     let started = Instant::now();
     for t in 1..=130 {
         stream.send(pictures::png(t % 20)).await;
@@ -339,7 +339,8 @@ fn large_jpeg(t: u32) -> Vec<u8> {
     pictures::encode(picture, ImageFormat::Jpeg)
 }
 
-/// A busy machine may be held up over the far line alone; a stream that waits for each answer is so each time.
+/// Tries several times: a busy machine may delay the far line by chance, but a stream that waits for each answer is
+/// always late.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_stream_does_not_wait_a_round_trip_for_each_frame() {
     const FRAMES: u32 = 100;
@@ -352,7 +353,7 @@ async fn a_stream_does_not_wait_a_round_trip_for_each_frame() {
         let far = time_of_frames(&app, line.address, FRAMES).await;
         let rate = f64::from(FRAMES) / far.as_secs_f64();
         println!("{rate:.1} frames/s over a round trip of 80 ms: {far:?}, and {near:?} without it");
-        // One that waits for each answer takes a hundred round trips longer, eight seconds.
+        // A stream that waits for each answer takes a hundred round trips longer: eight seconds.
         if far < near + FRAMES * ROUND_TRIP * 3 / 4 {
             return;
         }
@@ -361,8 +362,7 @@ async fn a_stream_does_not_wait_a_round_trip_for_each_frame() {
     panic!("{late:?}");
 }
 
-/// How long a stream of large frames by this address takes, of which eight are on their way: more than that a phone has
-/// no use for.
+/// The time of a stream of large frames through this address, with eight of them in flight.
 async fn time_of_frames(app: &TestApplication, address: SocketAddr, count: u32) -> Duration {
     let frames: Vec<Vec<u8>> = (0..20).map(large_jpeg).collect();
     let there_and_back = |i: usize| match (i / 20).is_multiple_of(2) {
@@ -401,7 +401,7 @@ async fn messages_without_a_frame_have_a_rate_and_a_frame_after_them_its_answer(
     client.send(pictures::png(1)).await;
     let answer = client.message().await;
     assert_eq!(answer["frame"], 1, "{answer}");
-    // All of them were once read in one turn of the network thread, whatever else waited for it.
+    // Reading them all in one turn of the network thread would take less, and hold up its other connections.
     let took = sent.elapsed();
     assert!(took > Duration::from_millis(1_500), "{took:?}");
     // Pings and empty fragments count like texts.
@@ -419,12 +419,12 @@ async fn messages_without_a_frame_have_a_rate_and_a_frame_after_them_its_answer(
     );
 }
 
-/// Sends these bytes ten times a second until the message that they are of is told to be too slow.
+/// Sends these bytes of a message ten times a second, until the service says that the message is too slow.
 async fn expect_too_slow(mut client: StreamClient, bytes: &[u8]) {
     let problem = loop {
         client.send_raw(bytes).await;
         tokio::select! {
-            // Where both are there on a busy machine, the stream has ended: nothing more can be sent.
+            // If the problem is there when the pause ends, the stream has ended, and nothing more can be sent.
             biased;
             problem = client.message() => break problem,
             () = tokio::time::sleep(Duration::from_millis(100)) => {}
@@ -440,7 +440,7 @@ async fn a_message_has_the_time_of_a_body_however_fast_its_bytes_come() {
     let app = app.await;
     let id = app.open().await;
     let mut client = StreamClient::open(app.address, &id, "").await;
-    // 200 kB, ten times as fast as the least rate: it once could last for minutes.
+    // A message of 200 kB, at ten times the least rate.
     client
         .send_raw(&[0x82, 0xFF, 0, 0, 0, 0, 0, 3, 0x0D, 0x40, 0, 0, 0, 0])
         .await;
@@ -453,8 +453,8 @@ async fn a_message_of_empty_frames_without_end_is_too_slow() {
     let app = app.await;
     let id = app.open().await;
     let mut client = StreamClient::open(app.address, &id, "").await;
-    // It begins with a byte, and is never the last one. More frames come than a client may send: it was held back, and
-    // its message had all the time of the world.
+    // A fragmented message of one byte and empty fragments without end, at more than the client's rate of frames. The
+    // rate limit delays the fragments, but that must not extend the time of the message.
     client.send_raw(&[0x02, 0x81, 0, 0, 0, 0, 7]).await;
     expect_too_slow(client, &[0x00, 0x80, 0, 0, 0, 0].repeat(2_000)).await;
 }

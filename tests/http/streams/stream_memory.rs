@@ -1,4 +1,4 @@
-//! What streams hold while nothing, or a part of a message, comes over them.
+//! The memory that streams take while they are idle, or have received a part of a message.
 
 use crate::application::{TestApplication, bound_bodies, expect, expect_problem};
 use crate::pictures;
@@ -22,7 +22,7 @@ async fn idle_streams_take_no_memory_of_uploads() {
         let id = app.open().await;
         streams.push((StreamClient::open(app.address, &id, "").await, id));
     }
-    // Nor do those over which a message has come.
+    // After a message, streams are as small again.
     for (stream, id) in &mut streams {
         stream.send(vec![0; 99_999]).await;
         let answer = stream.message().await;
@@ -82,7 +82,7 @@ async fn a_message_that_does_not_end_ends_its_stream() {
     let app = app.await;
     let id = app.open().await;
     let mut stream = StreamClient::open(app.address, &id, "").await;
-    // Between messages there is no hurry.
+    // Between messages there is no time limit.
     tokio::time::sleep(Duration::from_millis(300)).await;
     stream.send(pictures::png(1)).await;
     assert_eq!(stream.message().await["frame"], 1);

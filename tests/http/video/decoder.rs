@@ -1,4 +1,4 @@
-//! The process that decodes videos: what it may do, and where it is found.
+//! The process that decodes videos: its sandbox, and how the service finds the program.
 
 use crate::application::BOX;
 use crate::helpers::video_files::{FRAMES, video};
@@ -28,7 +28,7 @@ fn the_decoder_of_the_program_may_read_no_other_file_and_open_no_socket() {
         code == Some(1) && said.contains("Permission denied"),
         "{said}"
     );
-    // Nor does it read or write where all may.
+    // It cannot read or write files that everybody may access, either.
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("file");
     std::fs::write(&file, "text").unwrap();
@@ -47,13 +47,14 @@ fn the_decoder_of_the_program_may_read_no_other_file_and_open_no_socket() {
     assert_eq!(run(&["/nowhere/ffmpeg"]).0, Some(127));
 }
 
-/// After an upgrade another file has its name. A video was refused, or what had the name was started.
+/// After an upgrade, another file has the name of the running program. The decoder must be the running program.
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn a_program_whose_file_was_removed_decodes_videos() {
     let folder = tempfile::tempdir().unwrap();
     let own = folder.path().join("bagtrack");
-    // A process of its own: where this one wrote the file, one that another test begins meanwhile would hold it open.
+    // `cp` writes the file: if this process did, a child that another test starts meanwhile would inherit it, open for
+    // writing, and the program could not start.
     let program = bagtrack_testing::command::program("bagtrack");
     let copied = Command::new("cp").arg(program).arg(&own).status();
     assert!(copied.unwrap().success());

@@ -16,7 +16,7 @@ fn frames(folder: &Path) -> Vec<Vec<u8>> {
     files.collect()
 }
 
-/// The first box, as it stands in a query.
+/// The first box of a sequence, as text for a query.
 fn first_box(folder: &Path) -> String {
     let first = read_boxes(folder).unwrap()[0].expect("a first box");
     format!("{},{},{},{}", first.x, first.y, first.width, first.height)

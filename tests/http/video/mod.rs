@@ -1,4 +1,4 @@
-//! Whole videos: decoded, tracked, propagated between key frames, and against what was annotated.
+//! Whole videos: decoding, tracking, propagation between key frames, and comparison with annotated boxes.
 
 pub mod decoder;
 pub mod footage;

@@ -12,11 +12,11 @@ use std::process::Command;
 use tempfile::TempDir;
 
 const FRAMES: u64 = 60;
-/// In frame 30: the target of the sample clip, and a piece of its ground.
+/// Boxes in frame 30: the target of the sample clip, and a piece of the background.
 const BOXES: [&str; 2] = ["55,72,46,58", "200,30,40,40"];
 
-/// The sample clip as an MP4 with B-frames, so that the order of decoding is not that of showing; from frame 45 on it
-/// is an empty scene. It goes with its folder.
+/// The sample clip as an MP4 with B-frames, so that the orders of decoding and display differ; from frame 45 on, the
+/// scene is empty. The file is deleted with the returned folder.
 fn clip() -> (TempDir, PathBuf) {
     let folder = command::folder();
     let frames = command::clip(folder.path(), "clip", &["--frames", "60"]);
@@ -35,7 +35,7 @@ fn clip() -> (TempDir, PathBuf) {
     (folder, video)
 }
 
-/// The settings of the service that say the same as these flags of the command.
+/// Query parameters of the service that correspond to these flags of the command.
 fn settings(flags: &str) -> Vec<(&str, &str)> {
     let flags = flags.split("--").skip(1).map(str::trim);
     let settings = flags.map(|flag| match flag.split_once(' ') {
@@ -73,7 +73,7 @@ fn frame_of(value: &Value) -> u64 {
     value["frame"].as_u64().unwrap()
 }
 
-/// The answer of the service for a target is the row of the command.
+/// Checks that the service's answer for a target equals the command's row.
 fn check_same(answer: &Value, row: &Value) {
     for side in ["x", "y", "width", "height"] {
         let of = |value: &Value| value["box"][side].as_f64().unwrap();
@@ -136,7 +136,7 @@ async fn the_lines_of_several_targets_are_the_key_frames_of_each() {
     }
 }
 
-/// The file that the command writes of the first box and others.
+/// The file that the command writes for the first box, with further flags.
 fn file(video: &Path, format: &str, flags: &[&str]) -> String {
     let written = video.with_file_name(format!("written.{format}"));
     let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
@@ -194,7 +194,7 @@ async fn a_video_is_answered_by_the_file_that_the_command_writes() {
     let otb = [("box", BOXES[0]), ("seed", "7"), ("format", "otb")];
     let answer = track(&app, &video, &otb).await.text().await.unwrap();
     assert_eq!(answer, file(&video, "otb", &[]));
-    // A rate takes the place of the video's times.
+    // With a rate, times are counted by it, and those of the video are ignored.
     let query = [
         ("box", BOXES[0]),
         ("seed", "7"),
@@ -210,7 +210,7 @@ async fn a_video_is_answered_by_the_file_that_the_command_writes() {
     assert_eq!(times, [0.0, 0.1, 0.2, 0.3]);
 }
 
-/// The frames before the damage were lost with it, and nothing told how to have them.
+/// The problem must say how to get the frames before the damage.
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn a_file_of_a_damaged_video_is_had_of_the_frames_before_the_damage() {
@@ -280,7 +280,7 @@ async fn a_file_that_cannot_be_written_is_refused_before_the_video_is_tracked() 
 async fn frames_that_are_kept_for_the_way_back_are_charged_as_uploads() {
     let (_folder, video) = clip();
     let size = usize::try_from(video.metadata().unwrap().len()).unwrap();
-    // The video fits, and some ten frames of some 14 KiB.
+    // Memory for the video, and for about ten frames of 14 KiB.
     let app = TestApplication::start_with(|config| {
         config.max_body_bytes = 2 * size;
         config.max_upload_bytes = 2 * size + (160 << 10);
@@ -294,7 +294,7 @@ async fn frames_that_are_kept_for_the_way_back_are_charged_as_uploads() {
     );
     let few = [&query[..], &[("count", "5")]].concat();
     assert_eq!(lines(track(&app, &video, &few).await).await.len(), 6);
-    // Forwards nothing is kept.
+    // Tracking forwards keeps no frames.
     let forwards = [("box", BOXES[0]), ("start", "40")];
     assert_eq!(lines(track(&app, &video, &forwards).await).await.len(), 20);
 }

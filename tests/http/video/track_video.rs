@@ -1,4 +1,4 @@
-//! `POST /track` with a video and a box: a line for each frame, and nothing is kept. Most need ffmpeg.
+//! `POST /track` with a video and a box: a line for each frame, without a session. Most need ffmpeg.
 
 use crate::application::{TestApplication, expect_detail, expect_problem};
 use crate::helpers::heavy;
@@ -49,7 +49,7 @@ async fn a_video_and_a_box_get_a_line_for_each_frame_and_no_session() {
         ("video/webm", video("webm")),
         ("image/gif", video("gif")),
         ("video/x-motion-jpeg", motion_jpeg()),
-        // As curl and generated clients label it.
+        // The labels that curl and generated clients send.
         ("application/x-www-form-urlencoded", video("mp4")),
         ("application/json", video("mp4")),
     ] {
@@ -105,7 +105,7 @@ async fn what_is_wrong_with_the_video_or_the_box_is_told() {
         let refused = track(&app, query, "video/mp4", mp4.clone()).await;
         expect_problem(refused, slug).await;
     }
-    // It is a video, but none that is read.
+    // An AVI file is a video, but of no format that the service reads.
     let avi = [&b"RIFF\0\0\0\0AVI LIST"[..], &[0; 100]].concat();
     let of_video = [("box", FIRST), ("count", "2")];
     let refused = track(&app, &of_video, "video/x-msvideo", avi).await;
@@ -124,7 +124,7 @@ async fn what_is_wrong_with_the_video_or_the_box_is_told() {
     expect_problem(refused.unwrap(), "malformed-request").await;
 }
 
-/// All but its first picture was left out.
+/// If the part's type were ignored, only the first picture would count.
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn motion_jpeg_in_a_form_has_its_type_at_its_part() {
@@ -138,7 +138,7 @@ async fn motion_jpeg_in_a_form_has_its_type_at_its_part() {
     }
 }
 
-/// Frames before the start counted as those that are tracked, so that the end of a long video was out of reach.
+/// Frames before the start must not count towards the limit of frames: else the end of a long video is out of reach.
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn frames_before_the_start_do_not_count() {
@@ -159,7 +159,7 @@ async fn frames_before_the_start_do_not_count() {
     assert!(detail.as_str().unwrap().contains("`start=6`"), "{detail}");
 }
 
-/// A client that reads no further holds its one place for a video, and gives it back when it goes.
+/// A client that stops reading keeps its only place for a video, until it disconnects.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "needs ffmpeg"]
 async fn a_client_tracks_one_video_at_a_time_and_its_place_is_free_when_it_goes() {

@@ -28,12 +28,12 @@ async fn post(app: &TestApplication, id: &str, media_type: &str, video: Vec<u8>)
 async fn a_video_is_tracked_and_answered_line_by_line() {
     let app = TestApplication::start().await;
     for (media_type, video) in [
-        // Its index is at the end.
+        // This MP4 has its index at the end.
         ("video/mp4", video("mp4")),
         ("video/webm", video("webm")),
         ("image/gif", video("gif")),
         ("video/x-motion-jpeg", motion_jpeg()),
-        // As curl labels what it is not told about.
+        // The label that curl sends by default.
         ("application/x-www-form-urlencoded", video("mp4")),
     ] {
         let id = app.open().await;
@@ -47,7 +47,7 @@ async fn a_video_is_tracked_and_answered_line_by_line() {
     }
 }
 
-/// A video of which more was tracked than answers are stored could once not go on: its first number was out of order.
+/// The whole video is sent again, although the answers to its first frames are not stored any more.
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn a_long_video_that_is_sent_again_goes_on() {
@@ -73,7 +73,7 @@ async fn a_long_video_that_is_sent_again_goes_on() {
     assert_eq!(told(&again), expected.collect::<Vec<_>>());
     assert_eq!(app.frames_of(&id).await, all + 1);
 
-    // What reaches none of the stored answers, or others than they are of, is refused as before.
+    // A request that ends before the stored answers, or has other frames than they, is refused.
     let problem = expect_problem(send("1", &rest).await, "frame-out-of-order").await;
     assert_eq!(problem["expected_frame"], all + 1);
     let before = pictures::encode(pictures::scene(5), ImageFormat::Jpeg);
@@ -108,7 +108,7 @@ async fn a_video_comes_back_frame_by_frame() {
         assert_eq!(answer.status(), 200, "{extension}");
         assert_eq!(answer.headers()["content-type"], "video/x-motion-jpeg");
         let bytes = answer.bytes().await.unwrap();
-        // They are taken again as what they are, and show what was sent: the target goes right by 2 pixels a frame.
+        // The service accepts its own output as a video. In it, the target moves right by 2 pixels a frame.
         let id = app.open().await;
         let answers = lines(post(&app, &id, "video/x-motion-jpeg", bytes.to_vec()).await).await;
         assert_eq!(answers.len(), FRAMES as usize, "{extension}");
@@ -141,7 +141,7 @@ async fn a_video_of_too_large_pictures_comes_back_as_a_problem() {
     expect_problem(refused, "frame-too-large").await;
 }
 
-/// The times that JPEG files which follow each other tell in their first comments.
+/// The times in the first comments of concatenated JPEG files, in seconds.
 fn times(motion_jpeg: &[u8]) -> Vec<f64> {
     let begins = |window: &[u8]| window == b"\xFF\xD8\xFF\xFE";
     let files = (0..motion_jpeg.len() - 4).filter(|at| begins(&motion_jpeg[*at..at + 4]));
@@ -158,7 +158,7 @@ fn times(motion_jpeg: &[u8]) -> Vec<f64> {
 async fn frames_of_a_video_of_a_changing_rate_tell_when_they_are_shown() {
     let app = TestApplication::start().await;
     for extension in ["mp4", "webm"] {
-        // Of 30 frames a second the first two, and then every third.
+        // Uneven times: the first two of 30 frames a second, then every third.
         let selected = "-vf select=eq(n\\,1)+not(mod(n\\,3)) -vsync vfr ";
         let video = pattern(extension, 5, selected);
         let request = app.request(Method::POST, "/frames", &[]);
@@ -166,7 +166,7 @@ async fn frames_of_a_video_of_a_changing_rate_tell_when_they_are_shown() {
         let times = times(&answer.bytes().await.unwrap());
         let expected = [0, 1, 3, 6, 9].map(|frame| f64::from(frame) / 30.0);
         assert_eq!(times.len(), expected.len(), "{extension}: {times:?}");
-        // A WebM file counts milliseconds.
+        // WebM rounds times to milliseconds.
         let apart = times
             .iter()
             .zip(expected)
@@ -182,14 +182,14 @@ async fn frames_of_a_video_of_a_changing_rate_tell_when_they_are_shown() {
 #[ignore = "needs ffmpeg"]
 async fn frames_of_a_damaged_video_end_before_the_damage_and_the_answer_is_cut_off() {
     let app = TestApplication::start().await;
-    // Before the damage are more pictures than a pipe holds: ffmpeg waits there until the first ones are taken.
+    // Before the damage are more pictures than a pipe holds, so that ffmpeg reaches it only after some were read.
     let mut damaged = pattern("webm", 100, "");
     let (start, end) = (damaged.len() * 6 / 10, damaged.len() * 8 / 10);
     damaged[start..end].fill(0);
     let request = app.request(Method::POST, "/frames", &[]);
     let answer = request.body(damaged).send().await.unwrap();
     assert_eq!(answer.status(), 200);
-    // A whole answer would say that the video has no more.
+    // The body must be cut off: a complete one would mean that the video has no more pictures.
     let cut_off = answer.bytes().await.unwrap_err();
     assert!(cut_off.is_body() || cut_off.is_decode(), "{cut_off:?}");
 }
@@ -217,7 +217,7 @@ async fn what_is_wrong_with_a_video_is_told() {
     assert_eq!(last["type"], "/docs/problems#too-many-frames");
     assert_eq!(got.len(), 5);
     assert_eq!(app.frames_of(&id).await, 6);
-    // The index is missing.
+    // Half of the file, without the index at the end.
     let cut = whole[..whole.len() / 2].to_vec();
     let damaged = post(&app, &id, "video/mp4", cut).await;
     expect_detail(damaged, "frame-damaged", &["video"]).await;
@@ -240,7 +240,7 @@ async fn what_is_wrong_with_a_video_is_told() {
     .await;
 }
 
-/// What was told was the last line of ffmpeg, such as "To ignore this, add a trailing '?' to the map".
+/// The last line of ffmpeg, such as "To ignore this, add a trailing '?' to the map", would not help.
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn why_a_video_is_not_read_is_told_with_its_cure() {
@@ -269,7 +269,7 @@ async fn why_a_video_is_not_read_is_told_with_its_cure() {
             "frame-too-large",
             "scale=",
         ),
-        // 1,047,552 pixels. It was too large, since ffmpeg rounds its width up.
+        // 1,047,552 pixels, just below the limit, although ffmpeg rounds the width up in its buffers.
         (
             made("wide.mp4", "testsrc2=size=1364x768 -frames:v 2"),
             "frame-size-mismatch",
@@ -303,7 +303,7 @@ async fn why_a_video_is_not_read_is_told_with_its_cure() {
     assert_eq!(app.frames_of(&id).await, 1);
 }
 
-/// Players show it; it was refused as damaged from its first picture on.
+/// Players show such a cut video, so it is not damaged.
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn a_video_that_was_cut_in_an_open_group_of_pictures_is_decoded() {
@@ -313,7 +313,7 @@ async fn a_video_that_was_cut_in_an_open_group_of_pictures_is_decoded() {
     let open = "-c:v libx264 -x264-params open-gop=1:keyint=30:bframes=3";
     let source = "testsrc2=size=320x240:rate=30 -frames:v 150";
     std::fs::write(&whole, made("whole.mp4", &format!("{source} {open}"))).unwrap();
-    // The group before second 1.3 begins at 1.0; what is shown before 1.3 is left out by an edit list of MP4 alone.
+    // The cut at 1.3 s begins with the key frame at 1.0 s. Only MP4 hides the pictures before 1.3 s, by an edit list.
     for (name, expected) in [("cut.mp4", 111..=111), ("cut.mkv", 111..=121)] {
         let cut = folder.path().join(name);
         let mut command = Command::new("ffmpeg");
@@ -340,7 +340,7 @@ async fn a_video_that_was_cut_in_an_open_group_of_pictures_is_decoded() {
     }
 }
 
-/// It was told that a picture of the file was damaged.
+/// The problem must not say that a picture of the file is damaged.
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn of_a_video_that_needs_too_much_memory_it_is_told_how_to_make_it_smaller() {
@@ -368,7 +368,7 @@ async fn of_a_video_that_needs_too_much_memory_it_is_told_how_to_make_it_smaller
 async fn one_client_has_a_video_at_a_time_and_another_client_gets_the_next_place() {
     let app = TestApplication::start_with(|config| {
         config.workers = Some(1);
-        // In which a busy machine has a first picture.
+        // Long enough for a first picture on a busy machine.
         config.work_timeout = Duration::from_secs(5);
         behind_a_proxy(config);
     });
@@ -400,7 +400,7 @@ async fn one_client_has_a_video_at_a_time_and_another_client_gets_the_next_place
         short,
     );
     assert_eq!(lines(other.await).await.len(), FRAMES as usize);
-    // It was at work all the time.
+    // The first request was at work all the time.
     held.chunk().await.unwrap().expect("another line");
     drop(held);
 }
@@ -425,7 +425,7 @@ async fn readers_that_take_nothing_lose_their_places_to_a_video_that_waits() {
             if answer.status() == 200 {
                 return answer;
             }
-            // It has no place yet, or the machine is too busy for a first picture within the time.
+            // The place is not free yet, or the machine is too busy for a first picture in time: try again.
             expect(answer, reqwest::StatusCode::SERVICE_UNAVAILABLE).await;
         }
     };
@@ -437,8 +437,8 @@ async fn readers_that_take_nothing_lose_their_places_to_a_video_that_waits() {
     let other = async { frames_of("198.51.100.3", &short).await.bytes().await };
     let other = within(other, "a place is given up").await.unwrap();
     assert_eq!(times(&other).len(), FRAMES as usize);
-    // Who has lost its place is told so. The other one has lost it only where a try above ended between the promise of
-    // a place and the place.
+    // The answer to a request that has lost its place is cut off. Usually one of the two has; both, if a try above
+    // ended between being promised a place and getting it.
     let ends = join_all(held.map(Response::bytes)).await;
     assert!(
         ends.iter().any(Result::is_err),
@@ -447,13 +447,13 @@ async fn readers_that_take_nothing_lose_their_places_to_a_video_that_waits() {
     assert!(ends.iter().flatten().all(|bytes| times(bytes).len() == 300));
 }
 
-/// The lines up to the problem that ends them, which must name this many pictures before it.
+/// How many lines come before the problem that ends them, which must name that number of pictures.
 async fn until_damage(app: &TestApplication, video: Vec<u8>) -> usize {
     let id = app.open().await;
     let answer = post(app, &id, "video/mp4", video).await;
     let mut got = match answer.status().is_success() {
         true => lines(answer).await,
-        // Where the first picture cannot be had nothing was begun.
+        // If the first picture cannot be decoded, the problem is the whole answer.
         false => vec![expect_problem(answer, "frame-damaged").await],
     };
     let last = got.pop().expect("a line");
@@ -474,7 +474,7 @@ async fn damage_in_the_middle_of_a_video_is_told_and_nothing_after_it_is_numbere
     let app = TestApplication::start().await;
     let whole = video("mkv");
     let at = |part: f64| (whole.len() as f64 * part) as usize;
-    // Each of these once was 200 with fewer lines and no problem, or with frames of wrong numbers.
+    // Each of these must end with a problem: not with 200 and fewer lines, and not with wrong frame numbers.
     let mut zeros = whole.clone();
     zeros[at(0.4)..at(0.6)].fill(0);
     assert!(until_damage(&app, zeros).await < FRAMES as usize);
@@ -487,7 +487,7 @@ async fn damage_in_the_middle_of_a_video_is_told_and_nothing_after_it_is_numbere
     assert!(until_damage(&app, noise).await < FRAMES as usize);
 }
 
-/// The frames of a video up to its damage, which the last line must name.
+/// How many frames a video has before its damage; the last line must name that number.
 async fn frames_before_damage(app: &TestApplication, video: &[u8]) -> usize {
     let request = app.request(Method::POST, "/track", &[("box", "20,20,60,60")]);
     let answer = request.body(video.to_vec()).send().await.unwrap();
@@ -498,8 +498,8 @@ async fn frames_before_damage(app: &TestApplication, video: &[u8]) -> usize {
     got.len()
 }
 
-/// ffmpeg looks seconds ahead for the kind of the sound, and told the damage before the first picture: no row came.
-/// Without sound the damage was told some pictures early, at another one each time.
+/// ffmpeg reads seconds ahead to find the type of the sound, and may report the damage before the first picture;
+/// without sound, some pictures early. The rows before the damage must come all the same.
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn damage_is_told_at_its_picture_with_sound_and_without() {

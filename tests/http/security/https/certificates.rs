@@ -1,4 +1,4 @@
-//! Certificates and their keys, in files.
+//! Makes certificates and their keys, as files.
 
 use crate::application::TestApplication;
 use bagtrack::http::{Config, TlsConfig};
@@ -10,7 +10,7 @@ use rustls::pki_types::CertificateDer;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// Who signs certificates: a root that clients know, and an issuer that they do not know.
+/// Signs certificates: by a root that clients trust, and an intermediate issuer that clients do not know.
 pub struct Authority {
     pub root: CertificateDer<'static>,
     intermediate: String,
@@ -22,7 +22,7 @@ pub struct Files {
     folder: TempDir,
 }
 
-/// The kinds of keys that are made here.
+/// The types of keys, with their names.
 pub fn kinds() -> [(&'static str, &'static SignatureAlgorithm); 3] {
     [
         ("ECDSA P-256", &PKCS_ECDSA_P256_SHA256),
@@ -59,7 +59,7 @@ impl Authority {
         }
     }
 
-    /// A certificate of a new key, with that of its issuer after it.
+    /// A certificate for a new key, followed by that of the issuer.
     pub fn issue(&self, kind: &'static SignatureAlgorithm) -> Files {
         let files = Files {
             folder: tempfile::tempdir().unwrap(),
@@ -68,12 +68,12 @@ impl Authority {
         files
     }
 
-    /// Writes another certificate of a new key into these files.
+    /// Overwrites these files with a certificate for a new key.
     pub fn issue_into(&self, files: &Files, kind: &'static SignatureAlgorithm) {
         self.write(files, kind, host_params());
     }
 
-    /// Writes a certificate that is good from one year to another into these files.
+    /// Overwrites these files with a certificate that is valid from one year to the other.
     pub fn issue_for_years(&self, files: &Files, [from, to]: [i32; 2]) {
         let mut params = host_params();
         params.not_before = rcgen::date_time_ymd(from, 1, 1);

@@ -1,4 +1,4 @@
-//! A client that speaks HTTP over TLS by hand.
+//! A client that writes HTTP by hand over TLS.
 
 use bagtrack_testing::within::within;
 use rustls::pki_types::{CertificateDer, ServerName};
@@ -12,7 +12,7 @@ use tokio::net::{TcpSocket, TcpStream};
 use tokio_rustls::TlsConnector;
 use tokio_rustls::client::TlsStream;
 
-/// What connects with a service whose certificate this root has signed, and offers these protocols.
+/// A connector that trusts this root, and offers these protocols (ALPN).
 pub fn trusting(root: &CertificateDer<'static>, protocols: &[&str]) -> TlsConnector {
     let mut roots = RootCertStore::empty();
     roots.add(root.clone()).unwrap();
@@ -53,7 +53,7 @@ impl Answer {
 
 impl Client<TlsStream<TcpStream>> {
     /// # Errors
-    /// There is no handshake.
+    /// The handshake fails, or the connection.
     pub async fn try_open(connector: &TlsConnector, address: SocketAddr) -> io::Result<Self> {
         Self::over(TcpStream::connect(address).await?, connector).await
     }
@@ -64,7 +64,7 @@ impl Client<TlsStream<TcpStream>> {
         connected.await.map(Self)
     }
 
-    /// From another address of this machine.
+    /// Connects from another address of this machine.
     pub async fn open_from(from: IpAddr, connector: &TlsConnector, address: SocketAddr) -> Self {
         let socket = TcpSocket::new_v4().unwrap();
         socket.bind(SocketAddr::new(from, 0)).unwrap();
@@ -78,7 +78,7 @@ impl Client<TlsStream<TcpStream>> {
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
-    /// Sends a request and reads its answer, whose length is announced.
+    /// Sends a request and reads its answer, which must have a `Content-Length`.
     pub async fn call(&mut self, method: &str, target: &str, body: &[u8]) -> Answer {
         let head = format!(
             "{method} {target} HTTP/1.1\r\nHost: localhost:8443\r\nContent-Length: {}\r\n\r\n",

@@ -20,7 +20,7 @@ fn run(command: &mut Command) -> Output {
     output
 }
 
-/// Makes a certificate in `folder` by the commands of the document, with other words for the key in their place.
+/// Makes a certificate in `folder` by the commands of the document, with these options for the key.
 fn make(folder: &Path, key: &str) -> (PathBuf, PathBuf) {
     let commands = documented().replace("ec -pkeyopt ec_paramgen_curve:prime256v1", key);
     assert!(commands.contains(key), "{commands}");
@@ -65,7 +65,7 @@ async fn the_certificates_of_openssl_serve_curl_whatever_their_key_is() {
         let answer = run(curl(&certificate).args(["--data-binary", &frame(2), &post]));
         let answer: Value = serde_json::from_slice(&answer.stdout).unwrap();
         assert_eq!(answer["status"], "tracking", "{key}: {answer}");
-        // The 127.0.0.1 of the document is a name of the certificate, too; TLS 1.2 is spoken.
+        // The certificate also names 127.0.0.1, as in the document; and the service accepts TLS 1.2.
         let by_address = format!("https://{}/healthz", program.address);
         run(curl(&certificate).args(["--tls-max", "1.2", &by_address]));
         let strict = Command::new("curl")
@@ -76,7 +76,7 @@ async fn the_certificates_of_openssl_serve_curl_whatever_their_key_is() {
             Some(60),
             "nobody known has signed it"
         );
-        // What people type: curl is sent on to https.
+        // An http address, as people type it, redirects to https.
         let plain = format!("http://localhost:{}/healthz", program.address.port());
         run(curl(&certificate).args(["--location", &plain]));
     }

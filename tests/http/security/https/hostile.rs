@@ -30,7 +30,7 @@ async fn a_handshake_has_to_end_in_time() {
         stream.write_all(&HELLO_BEGUN[..begun]).await.unwrap();
         slow.push(Client(stream));
     }
-    // A byte now and then does not help.
+    // A handshake of single bytes with pauses is ended, too.
     let trickle = async {
         let mut stream = TcpStream::connect(service.address).await.unwrap();
         stream.write_all(&HELLO_BEGUN).await.unwrap();
@@ -43,7 +43,7 @@ async fn a_handshake_has_to_end_in_time() {
         client.ends().await;
     }
     assert!(started.elapsed() >= limit);
-    // A busy machine may take longer for a handshake than this service waits.
+    // On a busy machine, a handshake may take longer than this service waits: try again.
     let connector = trusting(&authority.root, &[]);
     let opened = async {
         loop {
@@ -113,7 +113,7 @@ async fn a_connection_over_its_share_is_for_probes_alone() {
     assert!(service.end().await);
 }
 
-/// Each costs the network thread a signature.
+/// Handshakes are limited because each costs the network thread a signature.
 #[tokio::test]
 async fn an_address_makes_so_many_handshakes_a_second_and_others_do_not_wait_for_them() {
     const AT_ONCE: usize = 64;
@@ -166,13 +166,13 @@ async fn a_client_that_never_reads_loses_its_connection() {
     let connector = trusting(&authority.root, &[]);
     let mut client = Client::open(&connector, service.address).await;
     let ask = "GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n".repeat(50);
-    // It sends without end, which fails when the service has closed the connection.
+    // Sends without end; sending fails when the service has closed the connection.
     let refused = async {
         while client.0.write_all(ask.as_bytes()).await.is_ok() && client.0.flush().await.is_ok() {}
     };
     within(refused, "the connection ends").await;
     let mut client = Client::open(&connector, service.address).await;
     assert_eq!(client.call("GET", "/healthz", b"").await.status(), "200");
-    // Its goodbye waits for nobody, either.
+    // The service ends without waiting for the client's `close_notify`.
     assert!(within(service.end(), "it ends").await);
 }

@@ -24,7 +24,7 @@ pub fn serve(certificate: &Path, key: &Path) -> Program {
     program
 }
 
-/// The certificate of the service, as a new client gets it.
+/// The certificate that the service presents to a new client.
 async fn shown(authority: &Authority, program: &Program) -> Vec<u8> {
     let connector = trusting(&authority.root, &[]);
     let mut client = Client::open(&connector, program.address).await;
@@ -49,14 +49,14 @@ async fn a_new_certificate_is_read_on_sighup_and_a_wrong_one_is_left() {
     assert_ne!(first, second);
     assert_eq!(old.call("GET", "/healthz", b"").await.status(), "200");
 
-    // A certificate without its key, as between two writes.
+    // The certificate does not match the key, as between the writes of the two files.
     let other = authority.issue(kinds()[0].1);
     std::fs::copy(other.certificate(), files.certificate()).unwrap();
     program.signal(Signal::HUP);
     let line = program.logs("the certificate stays as it was");
     assert!(line.contains("--tls-key"), "{line}");
 
-    // A pipe without a writer. This SIGHUP and all later ones waited for it.
+    // Reading a pipe without a writer must not block this SIGHUP, nor later ones.
     std::fs::remove_file(files.certificate()).unwrap();
     let mut command = Command::new("mkfifo");
     let made = command.arg(files.certificate()).status().await.unwrap();
@@ -67,7 +67,7 @@ async fn a_new_certificate_is_read_on_sighup_and_a_wrong_one_is_left() {
     assert_eq!(shown(&authority, &program).await, second);
 }
 
-/// Only clients tell of such a certificate otherwise, each in its own words.
+/// Without the warning, only clients would report such a certificate, each in its own words.
 #[test]
 fn the_log_warns_of_a_certificate_that_clients_refuse_for_its_time() {
     let authority = Authority::new();
@@ -114,7 +114,7 @@ async fn the_health_check_speaks_tls_to_a_service_with_a_certificate() {
     );
 }
 
-/// What the program says when it does not start.
+/// The message of the program, which must not start with these files.
 async fn refused(certificate: &Path, key: &Path) -> String {
     let mut command = Command::from(command(certificate, key));
     let output = within(command.kill_on_drop(true).output(), "it ends").await;

@@ -15,7 +15,7 @@ use tokio_tungstenite::tungstenite::Message;
 
 const FRAMES: usize = 8;
 
-/// A picture that moves to the left.
+/// Frames with a picture that moves to the left.
 fn frames() -> Vec<Vec<u8>> {
     let wide = pictures::color(400, 240);
     let frame = |step: usize| {
@@ -125,7 +125,7 @@ async fn who_speaks_plain_http_is_sent_to_https() {
         Some("https://localhost:8443/docs/?a=b")
     );
     assert_eq!(answer.header("x-content-type-options"), Some("nosniff"));
-    // It has sent its frame, and maybe its key, in the open: that is no success.
+    // The client has sent its frame, and maybe its key, unencrypted: the answer must not be a success.
     let answer = client
         .call("POST", "/sessions?box=60,50,60,50", &frames()[0])
         .await;
