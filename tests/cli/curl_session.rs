@@ -27,7 +27,7 @@ fn the_whole_curl_session_works_as_typed() {
     let session = block(&document, "## A whole session");
     let service = Program::start(&[], &[]);
     let folder = tempfile::tempdir().expect("the system has a place for temporary folders");
-    // Only what differs from a user's machine: where the binary is, and the port; and errors end the script.
+    // Changes to the documented commands: the path of the binary, the port, and that an error ends the script.
     let script = session
         .replace(
             "bagtrack sample",
@@ -60,7 +60,7 @@ fn the_whole_curl_session_works_as_typed() {
         !script.contains("sed ") && !script.contains("tr "),
         "plain commands alone"
     );
-    // The opening, one frame, two frames, one twice, a correction, the state, the restored session.
+    // The opening, one frame, two frames, one frame twice, a correction, the session's state, the restored session.
     assert_eq!(documents.len(), 8, "{answers}");
     assert_eq!(documents[0]["box"]["x"], 44.1);
     let documents = &documents[1..];

@@ -1,18 +1,18 @@
-//! Videos that were cut or damaged: which of their pictures have numbers. All need ffmpeg.
+//! Cut or damaged videos: which of their pictures count as frames. All need ffmpeg.
 
 use crate::command::{fails, folder, rows, succeeds, text};
 use crate::track_video::{TEST_PICTURES, ffmpeg_in, times_and_end};
 use std::fs;
 use std::path::Path;
 
-/// Whether these are all the times at 30 a second from the first one on.
+/// Whether these are consecutive times at 30 frames a second.
 fn are_even(times: &[f64]) -> bool {
     let mut pairs = times.windows(2);
     pairs.all(|pair| (pair[1] - pair[0] - 1.0 / 30.0).abs() < 2e-3)
 }
 
-/// After a cut in an open group of pictures, the first packets are of ones that are made from pictures before the cut.
-/// They were counted.
+/// After a cut in an open group of pictures, the first packets depend on pictures before the cut. They cannot be
+/// decoded, and must not count as frames.
 #[test]
 #[ignore = "needs ffmpeg"]
 fn pictures_that_cannot_be_made_after_a_cut_have_no_numbers() {
@@ -46,7 +46,7 @@ fn pictures_that_cannot_be_made_after_a_cut_have_no_numbers() {
         assert_eq!(later, times[start..]);
         let of_whole = parent.path().join(format!("0/{start:06}.jpg"));
         let of_whole = image::open(of_whole).expect("it was drawn").into_luma8();
-        // Squares of the ground, away from the box: a frame is 3 gray levels lighter than the one before.
+        // A pixel of the background, away from the box: each frame is 3 gray levels lighter than the one before.
         let gray = |picture: &image::GrayImage| f64::from(picture.get_pixel(68, 60).0[0]);
         assert!((gray(&picture) - gray(&of_whole)).abs() < 1.7, "{start}");
     }
@@ -55,7 +55,8 @@ fn pictures_that_cannot_be_made_after_a_cut_have_no_numbers() {
     assert!(line.contains(&format!("it has {beyond} frames")), "{line}");
 }
 
-/// Packets of pictures that others alone are made from had a number each and a time, and all after them were late.
+/// Packets of hidden pictures, which only serve to decode others, must not count as frames: all later times would be
+/// wrong.
 #[test]
 #[ignore = "needs ffmpeg"]
 fn pictures_of_vp8_that_are_not_shown_have_no_numbers() {
@@ -74,7 +75,7 @@ fn pictures_of_vp8_that_are_not_shown_have_no_numbers() {
     }
 }
 
-/// Each of these had no row, or had not all that can be had.
+/// Each of these must have rows for all pictures that can be decoded.
 #[test]
 #[ignore = "needs ffmpeg"]
 fn what_is_no_damage_of_a_picture_ends_no_video() {
@@ -83,11 +84,11 @@ fn what_is_no_damage_of_a_picture_ends_no_video() {
     let video = |name: &str| parent.path().join(name);
     let coded = "-f lavfi -i sine -frames:v 30 -c:v libx264 -c:a aac -shortest whole.mp4";
     make(&format!("{TEST_PICTURES} {coded}"));
-    // Sound is not decoded.
+    // Damage in the sound does not matter.
     make("-i whole.mp4 -c copy -bsf:a noise=amount=5 noisy.mp4");
     let (times, end) = times_and_end(&video("noisy.mp4"), "0");
     assert_eq!((times.len(), end.as_str()), (30, ""));
-    // The end is missing, which ffmpeg says as soon as it looks for the index.
+    // The end is missing, and ffmpeg reports that at once, when it looks for the index.
     make("-i whole.mp4 -an -c:v libvpx-vp9 -cpu-used 8 whole.webm");
     let bytes = fs::read(video("whole.webm")).expect("it was made");
     fs::write(video("cut.webm"), &bytes[..bytes.len() * 8 / 10]).expect("it is writable");
@@ -105,7 +106,8 @@ fn what_is_no_damage_of_a_picture_ends_no_video() {
     assert_eq!(times[8], times[9]);
 }
 
-/// Of a broadcast that is received from some moment on, the first pictures cannot be made. Nothing was tracked.
+/// A recording that begins in the middle of a broadcast: its first pictures cannot be decoded, the others must be
+/// tracked.
 #[test]
 #[ignore = "needs ffmpeg"]
 fn a_recording_that_begins_between_key_pictures_is_tracked_from_the_next_one_on() {
@@ -127,7 +129,7 @@ fn a_recording_that_begins_between_key_pictures_is_tracked_from_the_next_one_on(
         fs::write(&cut, &bytes[packets / 6 * 188..]).expect("it is writable");
         let (all, end) = times_and_end(&cut, "0");
         assert_eq!(end, "", "{name}");
-        // Beside the first key picture some cannot be made, either.
+        // A few pictures after the first key frame cannot be decoded, either.
         assert!(
             (58..90).contains(&all.len()) && are_even(&all[3..]),
             "{name}: {all:?}"

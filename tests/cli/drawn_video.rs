@@ -1,4 +1,4 @@
-//! Videos and pictures that `bagtrack track` draws. Most need ffmpeg.
+//! Videos and pictures with painted boxes (`bagtrack track --draw`). Most need ffmpeg.
 
 use crate::command::{about, bagtrack, folder, probe, rows, succeeds, text};
 use crate::track_video::{TEST_PICTURES, ffmpeg_in, shown_at, small_clip};
@@ -9,7 +9,7 @@ use std::process::Command;
 #[ignore = "needs ffmpeg"]
 fn each_ending_that_is_offered_becomes_a_video_of_this_kind() {
     let parent = folder();
-    // Odd sides are made even where the encoder wants that.
+    // Odd sides are made even if the encoder needs that.
     let (dir, target) = small_clip(parent.path(), "odd", ["161", "121"]);
     for (ending, kind, size) in [
         ("mp4", "mp4", "162,122"),
@@ -77,7 +77,7 @@ fn an_encoder_that_this_ffmpeg_does_not_have_is_told_before_the_first_row() {
     let programs = parent.path().join("programs");
     fs::create_dir(&programs).expect("the folder is writable");
     let program = programs.join("ffmpeg");
-    // The real one, which is told to take an encoder that it does not have.
+    // A script that calls the real ffmpeg with an encoder that it does not have.
     let path = std::env::var("PATH").expect("it is set");
     let encode = "-f mjpeg -i pipe:0 -c:v nothing";
     let script = format!(
@@ -129,7 +129,7 @@ fn a_folder_has_no_frames_that_are_hidden_and_draws_each_of_the_others() {
     assert_eq!(names.collect::<Vec<_>>(), ["a.jpg", "a.png.jpg"]);
 }
 
-/// The pixels of DV, of DVDs and of many cameras are no squares. What was drawn was shown too narrow.
+/// DV, DVDs and many cameras have pixels that are not square; the drawn video must have the same aspect ratio.
 #[test]
 #[ignore = "needs ffmpeg"]
 fn a_drawn_video_has_pixels_of_the_shape_of_the_source() {
@@ -145,7 +145,7 @@ fn a_drawn_video_has_pixels_of_the_shape_of_the_source() {
     }
 }
 
-/// Players show a picture for a tenth of a second where it has less than two hundredths.
+/// Players show a picture of a GIF for 0.1 s if its time is below 0.02 s.
 #[test]
 #[ignore = "needs ffmpeg"]
 fn a_gif_of_a_fast_video_lasts_as_long_as_the_video() {

@@ -1,9 +1,9 @@
-//! What `--help` says: commands on one screen, and the parameters that `--set` takes.
+//! The text of `--help`: the commands on one screen, and the parameters of `--set`.
 
 use crate::command::succeeds;
 use bagtrack_tracker::{Params, Preset};
 
-/// The lines of the long help of `track` after the flags, in words.
+/// The lines of the long help of `track` after the flags, split into words.
 fn listed() -> Vec<Vec<String>> {
     let help = succeeds(&["track", "--help"]);
     let (_, list) = help
@@ -63,7 +63,7 @@ fn the_help_of_the_program_fits_a_screen_and_names_the_commands() {
         assert!(named, "{command}: {help}");
     }
     assert!(help.contains("bagtrack serve --help"), "{help}");
-    // The settings are where it says, and hold without the command, too.
+    // The long help lists the settings, which are also accepted without the command.
     assert!(succeeds(&["serve", "--help"]).contains("--session-idle"));
 }
 
@@ -80,7 +80,7 @@ fn each_setting_of_the_service_is_below_a_heading() {
             flags.entry(heading).or_default().push(flag);
         }
     }
-    // The tables of crates/config have the headings of the settings, `serve` those of its own flags.
+    // Each flag has a heading, by the tables of crates/config or by `serve` itself.
     assert_eq!(flags["Options"], ["--help"], "without a heading: {help}");
     assert!(flags["Listening"].contains(&"--listen"), "{help}");
     assert!(flags["Store"].contains(&"--store-prefix"), "{help}");
@@ -103,7 +103,7 @@ fn shells_get_scripts_that_complete_commands_and_flags() {
             assert!(script.contains(word), "{shell}: no {word}");
         }
     }
-    // A real bash completes with it.
+    // Runs the completions in a real bash.
     let script = "source <(\"$0\" completions bash); COMP_WORDS=(bagtrack track --dr); COMP_CWORD=2; \
                   _bagtrack bagtrack --dr track; echo \"${COMPREPLY[@]}\"";
     let mut bash = std::process::Command::new("bash");

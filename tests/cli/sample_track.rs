@@ -129,7 +129,7 @@ fn track_takes_the_first_annotated_box_and_counts_from_zero() {
     {
         assert!((found - expected).abs() < 1e-9, "{found} is not {expected}");
     }
-    // The card moves by most of its height in these frames, and the box goes along.
+    // The card moves by most of its height in these frames; the box must follow.
     let rect = |[x, y, width, height]: [f64; 4]| Rect::new(x, y, width, height);
     let [left, top, width, height] = boxes(&truth)[11];
     let last = Rect::new(left - 1.0, top - 1.0, width, height);
@@ -190,7 +190,7 @@ fn track_draws_the_box_and_nothing_else() {
     for (x, y) in [(20, 130), (110, 130), (65, 80), (65, 180), (300, 20)] {
         assert!(difference(x, y) < 60, "something at {x}, {y}");
     }
-    // The folder of the frames themselves, or one with anything in it, is never written to.
+    // `--draw` refuses the folder of the frames, and any folder that is not empty.
     let line = fails(&["track", text(&dir), "--draw", text(&dir.join("img"))]);
     assert!(line.contains("is not empty"), "{line}");
 }

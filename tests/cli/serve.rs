@@ -1,11 +1,11 @@
-//! `bagtrack serve` beside the other commands: what it says at its start, and that it answers as `track` does.
+//! `bagtrack serve`: its messages at the start, and that it answers as `bagtrack track` does.
 
 use crate::command::{clip, folder, succeeds, text};
 use crate::program::{self, Program};
 use serde_json::Value;
 use std::fs;
 
-/// Starts it, and reads its log up to the address for this machine, which is said last: gives both.
+/// Starts the service, and reads its log up to the line with the address for this machine, which comes last.
 fn start(flags: &[&str]) -> (Program, String) {
     let mut service = Program::start(flags, &[]);
     let line = service.logs("in a browser");
@@ -39,7 +39,7 @@ fn the_address_has_the_base_path() {
     assert!(page(&url).contains("<html"), "{url}");
 }
 
-/// Nobody can open http://0.0.0.0.
+/// The address in the log must be one that a browser can open, which http://0.0.0.0 is not.
 #[test]
 fn for_all_interfaces_it_says_the_address_of_this_machine_in_its_network() {
     let (service, here) = start(&["--listen", "0.0.0.0:0", "--no-auth"]);
@@ -103,7 +103,7 @@ fn a_session_of_several_targets_gets_the_answers_that_track_gives() {
                 (&line["frame"], &line["target"]),
                 (&answer["frame"], &target.into())
             );
-            // The service answers hundredths of a pixel.
+            // The service rounds to hundredths of a pixel.
             for side in ["x", "y", "width", "height"] {
                 let exact = line["box"][side].as_f64().expect("a number");
                 let rounded = (100.0 * exact).round() / 100.0;
@@ -115,12 +115,12 @@ fn a_session_of_several_targets_gets_the_answers_that_track_gives() {
     }
 }
 
-/// What the program says where it does not start with these flags.
+/// The message of the program, which must not start with these flags.
 fn refusal(flags: &[&str]) -> String {
     refusal_with(flags, &[])
 }
 
-/// The same, with variables of the environment.
+/// Like [`refusal`], with variables of the environment.
 fn refusal_with(flags: &[&str], variables: &[(&str, &str)]) -> String {
     let mut command = program::serve(&bagtrack_testing::command::program("bagtrack"));
     let command = command.args(flags).envs(variables.iter().copied());
@@ -130,7 +130,7 @@ fn refusal_with(flags: &[&str], variables: &[(&str, &str)]) -> String {
     }
 }
 
-/// Each was once taken, and then nothing was logged, or those hosts were refused.
+/// If these values were accepted, nothing would be logged, or hosts would be refused.
 #[test]
 fn settings_that_cannot_work_are_refused_with_what_would() {
     for log in ["warning", "loud", "info,bagtrak"] {
@@ -141,14 +141,14 @@ fn settings_that_cannot_work_are_refused_with_what_would() {
         let said = refusal(&["--allowed-hosts", hosts]);
         assert!(said.contains("hosts like example.org"), "{said}");
     }
-    // Of the second the host was taken to be `ss`.
+    // A lenient parser would take `ss` for the host of the second address.
     for store in ["redis://:pa#ss@localhost", "redis://user:pa@ss#w@localhost"] {
         let said = refusal(&["--store", store]);
         assert!(said.contains("`%23`") && !said.contains("ss@"), "{said}");
     }
 }
 
-/// Charts and compose files pass variables that nobody gave.
+/// Charts and compose files pass variables without a value.
 #[test]
 fn an_empty_variable_counts_as_not_set_but_for_those_of_access() {
     let empty = [
@@ -169,7 +169,7 @@ fn an_empty_variable_counts_as_not_set_but_for_those_of_access() {
     }
 }
 
-/// The folder of a store may have been made by somebody else, for all to look into.
+/// The folder of the store may exist already, readable for everybody.
 #[cfg(unix)]
 #[test]
 fn files_of_a_store_are_for_the_user_of_the_process_alone() {

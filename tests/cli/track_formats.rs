@@ -47,7 +47,7 @@ fn the_default_is_a_table_with_score_and_status() {
     assert_eq!(lines.len(), 25);
 }
 
-/// A table was written into them.
+/// A table must not be written into a file of another type.
 #[test]
 fn the_name_of_the_file_says_its_format() {
     let (parent, dir) = sample_clip();
@@ -80,7 +80,7 @@ fn otb_and_mot_count_from_one() {
     let csv = rows(&succeeds(&[&flags[..], &["csv"]].concat()));
     let otb = succeeds(&[&flags[..], &["otb"]].concat());
     assert_eq!(boxes(&otb)[0], [45.1, 102.4, 46.1, 57.6]);
-    // The reader of the benchmark's files finds the boxes of the other formats.
+    // The reader of OTB files finds the same boxes as the other formats have.
     let read = parse_boxes(&otb).expect("it is the benchmark's format");
     assert_eq!(read.len(), csv.len());
     for (read, row) in read.iter().zip(&csv) {
@@ -105,7 +105,7 @@ fn several_targets_are_followed_as_each_would_be_in_a_session() {
     let order: Vec<(u64, usize)> = both.iter().map(|row| (row.frame, row.target)).collect();
     let expected: Vec<(u64, usize)> = (0..12).flat_map(|frame| [(frame, 0), (frame, 1)]).collect();
     assert_eq!(order, expected);
-    // The first target is the one that it is alone. The frames are decoded for the smallest, so only nearly.
+    // Alone, the first target has nearly the same boxes: frames are decoded at a size for the smallest target.
     let alone = rows(&succeeds(&[&flags[..], &["csv", ONE]].concat()));
     for (a, b) in areas(&both, 0).iter().zip(areas(&alone, 0)) {
         assert!(
@@ -113,7 +113,7 @@ fn several_targets_are_followed_as_each_would_be_in_a_session() {
             "{a:?} {b:?}"
         );
     }
-    // The second stands still, the first one does not.
+    // The second target stands still, the first one moves.
     let last = |target| areas(&both, target)[11];
     assert!((last(1)[0] - 200.0).abs() < 5.0 && (last(1)[1] - 30.0).abs() < 5.0);
     assert!((last(0)[1] - 101.4).abs() > 10.0, "{:?}", last(0));
@@ -159,7 +159,7 @@ fn boxes_go_to_a_new_file() {
     let (parent, dir) = sample_clip();
     let file = parent.path().join("boxes.csv");
     let flags = ["track", text(&dir), "--format", "csv"];
-    // What fails before the first row leaves no file that would be in the way.
+    // A command that fails before the first row leaves no file, which would block the next try.
     fails(&[&flags[..], &["--box=900,1,20,20", "-o", text(&file)]].concat());
     assert!(!file.exists());
     let printed = succeeds(&[&flags[..], &[ONE]].concat());
@@ -173,7 +173,7 @@ fn boxes_go_to_a_new_file() {
     let line = fails(&[&flags[..], &["-o", text(&nowhere)]].concat());
     assert!(line.contains("nowhere"), "{line}");
     assert_eq!(succeeds(&[&flags[..], &[ONE, "-o", "-"]].concat()), printed);
-    // A frame that cannot be read ends the command; what was written before stays.
+    // An unreadable frame ends the command; the rows before it stay in the file.
     fs::write(dir.join("img/0005.jpg"), "no picture").expect("the folder is writable");
     let file = parent.path().join("part.csv");
     fails(&[&flags[..], &[ONE, "-o", text(&file)]].concat());
@@ -220,7 +220,7 @@ fn documents_of_annotation_tools_tell_the_boxes_of_the_others() {
     let boxes: Vec<&str> = cvat.lines().filter(|it| it.starts_with("<box")).collect();
     assert_eq!(boxes.len(), csv.len());
     for row in &csv {
-        // One track after the other.
+        // The file has the boxes of one track after the other, 12 each.
         let line = boxes[12 * row.target + row.frame as usize];
         assert_eq!(attribute(line, "frame"), row.frame.to_string());
         assert_eq!(attribute(line, "outside"), "0");
@@ -263,7 +263,7 @@ fn a_part_of_a_clip_ends_where_it_was_tracked_to() {
         .map(|at| sequence[at]["enabled"].as_bool().expect("it is there"))
         .collect();
     assert_eq!(enabled, [true, true, true, true, true, false]);
-    // To the last frame, or back from it, there is nothing after it.
+    // If tracking reaches the last frame, or goes back from it, no frame follows the row.
     let flags = format!("{ONE} --start 11 --format cvat");
     for (more, first_frame) in [("--frames 99", "11"), ("--backwards", "0")] {
         let cvat = succeeds(&track(&dir, &format!("{flags} {more}")));
@@ -283,7 +283,7 @@ fn labels_of_yolo_go_to_a_new_folder() {
     let with = [&flags[..], &["-o", text(&out)]].concat();
     assert_eq!(succeeds(&with), "");
     let about = fs::read_to_string(out.join("data.yaml")).expect("it was written");
-    // With a `path` of its own it would be found from one folder only.
+    // With an entry `path`, the data set could be found from one folder only.
     assert!(about.starts_with("train: images/train\n"), "{about}");
     assert!(
         about.ends_with("names:\n  0: \"Object 1\"\n  1: \"Object 2\"\n"),
@@ -307,7 +307,7 @@ fn labels_of_yolo_go_to_a_new_folder() {
     );
 }
 
-/// No reader of XML took the file.
+/// With control characters in it, no XML parser would accept the file.
 #[test]
 fn what_xml_does_not_have_is_in_no_name() {
     let parent = folder();

@@ -1,4 +1,4 @@
-//! A box propagated from a key frame: so many frames, backwards, until it is lost, thinned to key frames.
+//! Propagating a box from a key frame: for a number of frames, backwards, until it is lost, and as key frames only.
 
 use crate::command::{Row, clip, fails, folder, rows, succeeds, text, track, video_of};
 use std::fs;
@@ -78,7 +78,7 @@ fn a_video_is_tracked_backwards_frame_by_frame_with_an_index_and_without() {
             (0..=79).rev().collect::<Vec<u64>>(),
             "{name}"
         );
-        // A frame that is not the one that its number says would be off by several pixels.
+        // The box of a wrong frame would be off by several pixels.
         let of_folder = rows(&succeeds(&track(&dir, &flags)));
         for (a, b) in tracked.iter().zip(of_folder) {
             let near = (a.area[0] - b.area[0]).hypot(a.area[1] - b.area[1]);
@@ -123,7 +123,7 @@ fn key_frames_give_every_box_to_within_a_pixel_by_straight_lines() {
                     let near = (between(side) - row.area[side]).abs();
                     let far =
                         between(side) + between(side + 2) - row.area[side] - row.area[side + 2];
-                    // Rows have three places after the point.
+                    // Rows are rounded to thousandths.
                     assert!(
                         near.max(far.abs()) < 1.01,
                         "{row:?} between {a:?} and {b:?}"
@@ -140,7 +140,7 @@ fn key_frames_give_every_box_to_within_a_pixel_by_straight_lines() {
 fn it_ends_with_the_frame_in_which_the_target_is_lost() {
     let parent = folder();
     let (dir, target) = long_clip(parent.path(), 0);
-    // From frame 20 on nothing is there any more: the frames are those of an empty scene.
+    // From frame 20 on, the frames show an empty scene.
     let empty = image::GrayImage::from_pixel(320, 240, image::Luma([128]));
     for index in 21..=80 {
         let path = dir.join(format!("img/{index:04}.jpg"));

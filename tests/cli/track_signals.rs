@@ -1,4 +1,4 @@
-//! Ctrl-C while `bagtrack track` draws a video: the video plays, and the rows are kept.
+//! Ctrl-C while `bagtrack track` draws a video: the video so far must play, and the rows must be kept.
 #![cfg(unix)]
 
 use crate::command::{about, clip, folder, rows, text, video_of};
@@ -9,14 +9,14 @@ use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::Path;
 use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 
-/// Of the video: it would take many seconds.
+/// Frames of the video; tracking them all would take many seconds.
 const FRAMES: usize = 12 * 100;
 
 /// `bagtrack track` as a terminal starts it: with a process group of its own, whose members all get Ctrl-C.
 fn start(args: &[&str]) -> (Child, BufReader<ChildStdout>) {
     let program = env!("CARGO_BIN_EXE_bagtrack");
     let mut command = match cfg!(target_os = "linux") {
-        // The tests may run under nohup, whose programs ignore SIGHUP.
+        // Restores SIGHUP: under nohup, programs ignore it.
         true => Command::new("env"),
         false => Command::new(program),
     };
@@ -35,7 +35,8 @@ fn id(child: &Child) -> Pid {
     Pid::from_raw(i32::try_from(child.id()).expect("a small number")).expect("it runs")
 }
 
-/// Reads some rows, sends the signal to all of the group, reads the rest. Returns all, and how it ended.
+/// Reads some rows, sends the signal to the process group, and reads the rest. Returns standard output and standard
+/// error, and the exit status.
 fn stop_by(signal: Signal, args: &[&str]) -> (String, String, ExitStatus) {
     let (mut child, mut out) = start(args);
     let mut text = String::new();
@@ -50,10 +51,10 @@ fn stop_by(signal: Signal, args: &[&str]) -> (String, String, ExitStatus) {
     (text, said, child.wait().expect("it is a child"))
 }
 
-/// A video that takes far longer than it takes to send a signal.
+/// A video that takes far longer to track than a signal takes to arrive.
 fn long_video(parent: &Path) -> std::path::PathBuf {
     let dir = clip(parent, "clip", &["--width", "160", "--height", "120"]);
-    // Without an index: it cannot be entered in the middle.
+    // A video without an index: ffmpeg must read it from the beginning.
     let video = parent.join("long.avi");
     video_of(&dir, &video, 100);
     video
@@ -67,7 +68,7 @@ fn a_signal_ends_the_drawn_video_properly_and_keeps_the_rows() {
     for (signal, status, name) in [
         (Signal::INT, 130, "stopped.mp4"),
         (Signal::TERM, 143, "stopped.avi"),
-        // The terminal has closed.
+        // SIGHUP, as when the terminal is closed.
         (Signal::HUP, 129, "stopped.mkv"),
     ] {
         let drawn = parent.path().join(name);
@@ -95,7 +96,7 @@ fn a_signal_keeps_the_rows_of_a_file_and_of_a_folder() {
     assert_eq!(pictures, rows(&csv).len());
 }
 
-/// Passing over the frames before the start can take long.
+/// Skipping the frames before `--start` can take long, and must be interruptible, too.
 #[test]
 #[ignore = "needs ffmpeg"]
 fn a_signal_before_the_first_row_ends_it_too() {
@@ -104,7 +105,7 @@ fn a_signal_before_the_first_row_ends_it_too() {
     let file = parent.path().join("boxes.csv");
     let start_at = (FRAMES - 1).to_string();
     let (mut child, _out) = start(&[text(&video), "--start", &start_at, "-o", text(&file)]);
-    // The file is made when the frames are about to be read.
+    // Once the output file exists, the command is about to read the frames.
     while !file.exists() {
         assert!(child.try_wait().expect("it is a child").is_none());
         std::thread::yield_now();
@@ -114,7 +115,7 @@ fn a_signal_before_the_first_row_ends_it_too() {
     assert!(!file.exists(), "a file without a row");
 }
 
-/// The rows go to a pipe that nobody reads: it waits for a reader, not for signals.
+/// The rows go to a pipe that nobody reads, so the command is blocked in a write when the signal comes.
 #[test]
 fn a_second_signal_ends_it_at_once() {
     let parent = folder();
@@ -128,7 +129,7 @@ fn a_second_signal_ends_it_at_once() {
     assert!(made.expect("mkfifo starts").success());
     let drawn = parent.path().join("drawn");
     let (mut child, _out) = start(&[text(&dir), "-o", text(&pipe), "--draw", text(&drawn)]);
-    // It listens to signals before it makes the folder.
+    // The command installs its signal handlers before it makes the folder.
     while !drawn.exists() {
         assert!(child.try_wait().expect("it is a child").is_none());
         std::thread::yield_now();
@@ -136,7 +137,7 @@ fn a_second_signal_ends_it_at_once() {
     kill_process(id(&child), Signal::INT).expect("it runs");
     kill_process(id(&child), Signal::TERM).expect("it runs");
     let ended = child.wait().expect("it is a child");
-    // Where both wait to be delivered, either is the second.
+    // If both signals are pending, either may be delivered last.
     let signals = [Signal::INT, Signal::TERM].map(|signal| Some(signal.as_raw()));
     assert!(signals.contains(&ended.signal()), "{ended}");
 }

@@ -1,4 +1,4 @@
-//! `bagtrack track` on a video: where it starts, and when its frames are shown. Most need ffmpeg.
+//! `bagtrack track` on a video: the frame it starts at, and the times of frames. Most need ffmpeg.
 
 use crate::command::{
     about, bagtrack, boxes, clip, fails, folder, probe, program, rows, succeeds, success, text,
@@ -36,7 +36,7 @@ fn a_video_gets_the_boxes_of_its_frames_and_a_drawn_video_has_all_of_them() {
     let (a, b) = (rows(&of_folder), rows(&of_video));
     assert_eq!((a.len(), b.len()), (12, 12));
     for (index, (a, b)) in a.iter().zip(&b).enumerate() {
-        // The same frames but for what the codec lost.
+        // The frames differ only by the loss of the codec.
         let near = |side: usize| (a.area[side] - b.area[side]).abs() < 3.0;
         assert!(near(0) && near(1), "{a:?} {b:?}");
         assert_eq!((a.frame, a.time), (index as u64, None));
@@ -53,7 +53,7 @@ fn a_video_gets_the_boxes_of_its_frames_and_a_drawn_video_has_all_of_them() {
     assert!(pictures.join("000011.jpg").is_file());
 }
 
-/// There was "No such file or directory".
+/// The message must say that ffmpeg is missing, not "No such file or directory".
 #[test]
 fn standard_input_and_addresses_are_told_as_no_files() {
     for source in ["-", "http://127.0.0.1/clip.mp4"] {
@@ -144,14 +144,14 @@ fn the_start_is_exactly_the_frame_that_is_named_in_each_kind_of_file() {
     let open_264 = format!("libx264 -x264-params {open} -bf 3");
     let open_265 = format!("libx265 -x265-params log-level=none:{open} -bf 3");
     for (name, coded) in [
-        // Frames before one that stands for itself are made from it, and from those before it.
+        // Frames shown before a key frame may depend on it and on earlier ones (open groups of pictures).
         ("open.mp4", &open_264[..]),
         ("open.mkv", &open_264),
         ("open.mov", &open_265),
-        // With B-frames, and few frames that stand for themselves.
+        // With B-frames, and few key frames.
         ("b.mp4", "libx264 -bf 3 -g 20"),
         ("b.mkv", "libx264 -bf 3 -g 20"),
-        // It counts in frames: a time between two of them is rounded to one.
+        // The time scale of this file is one frame, so that a time between two frames is rounded to one of them.
         ("ticks.mp4", "libx264 -bf 0 -video_track_timescale 30"),
         ("late.mov", "mpeg4 -output_ts_offset 3 -g 20"),
         ("golden.webm", "libvpx-vp9 -cpu-used 8 -g 20"),
@@ -183,7 +183,7 @@ fn the_start_is_exactly_the_frame_that_is_named_in_each_kind_of_file() {
             );
             let picture = image::open(pictures.join(format!("{start:06}.jpg")));
             let picture = picture.expect("it was drawn").into_luma8();
-            // A square of the ground, away from the box.
+            // A square of the background, away from the box.
             let area = image::imageops::crop_imm(&picture, 66, 58, 4, 4).to_image();
             let sum: f64 = area.pixels().map(|pixel| f64::from(pixel.0[0])).sum();
             let mean = sum / 16.0;
@@ -192,7 +192,7 @@ fn the_start_is_exactly_the_frame_that_is_named_in_each_kind_of_file() {
             } else {
                 25.0
             };
-            // Luma is stored from 16 to 235.
+            // The codec stores luma in the range 16 to 235.
             let expected = (20.0 + dark + 4.0 * start as f64 - 16.0) * 255.0 / 219.0;
             assert!(
                 (mean - expected).abs() < 2.3,
@@ -230,7 +230,8 @@ pub fn times_and_end(video: &Path, start: &str) -> (Vec<f64>, String) {
     (times.collect(), errors)
 }
 
-/// Its length is not known beforehand. A reader of the file took the last box for that of all frames to the end.
+/// The length of the video is not known in advance. The file must say that the track ends, or a reader would take the
+/// last box for that of all later frames.
 #[test]
 #[ignore = "needs ffmpeg"]
 fn a_track_ends_in_cvat_where_the_video_goes_on_without_known_times() {
@@ -249,7 +250,7 @@ fn a_track_ends_in_cvat_where_the_video_goes_on_without_known_times() {
     }
 }
 
-/// Those of HD videos were taken for the ones of a JPEG file: 7 of 255 off on average.
+/// Read with the colour matrix of JPEG files, HD videos would be off by 7 of 255 on average.
 #[test]
 #[ignore = "needs ffmpeg"]
 fn a_video_has_the_same_colors_whatever_matrix_they_are_stored_with() {
@@ -312,7 +313,7 @@ fn images_that_are_not_read_are_told() {
     assert!(output.status.success());
 }
 
-/// A browser's recording of a screen is like this: frames come when something changes.
+/// For example a browser's recording of a screen, which has a frame when something changes.
 #[test]
 #[ignore = "needs ffmpeg"]
 fn frames_that_are_closer_than_the_rate_says_are_all_taken() {
@@ -341,14 +342,14 @@ fn frames_that_are_closer_than_the_rate_says_are_all_taken() {
     assert_eq!(times(&succeeds(&from_four)), expected[4..]);
 }
 
-/// Frames of a phone come at uneven times.
+/// Phones record frames at uneven times.
 #[test]
 #[ignore = "needs ffmpeg"]
 fn times_are_those_of_the_video_also_where_its_rate_changes() {
     let parent = folder();
     let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
     let video = parent.path().join("uneven.mp4");
-    // From frame 6 on they are 1 s later.
+    // Frames from 6 on are 1 s later.
     let late = "-vf settb=1/1000,setpts=PTS+gte(N\\,6)*1000 -vsync vfr";
     let frames = format!("-framerate 30 -i img/%04d.jpg {late} {}", text(&video));
     ffmpeg_in(&dir, &frames);
@@ -365,7 +366,7 @@ fn times_are_those_of_the_video_also_where_its_rate_changes() {
     }
     let found = rows(&succeeds(&[&flags[..], &["--start", "0.5s"]].concat()));
     assert_eq!(found[0].frame, 6);
-    // So are those of a drawn video. It showed the frames at their average rate.
+    // A drawn video must show the frames at the same times, not at their average rate.
     let draw = |name: &str, flags: &[&str]| {
         let drawn = parent.path().join(name);
         succeeds(
@@ -392,7 +393,7 @@ fn times_are_those_of_the_video_also_where_its_rate_changes() {
         let times = draw(name, flags);
         assert_eq!(times.len(), count, "{name}: {times:?}");
         for (index, time) in times.iter().enumerate() {
-            // A GIF has hundredths of a second, Matroska thousandths.
+            // GIF rounds times to hundredths of a second, Matroska to thousandths.
             assert!(
                 (time - late(index, from)).abs() < 6e-3,
                 "{name}, {index}: {times:?}"
@@ -411,7 +412,7 @@ fn times_are_those_of_the_video_also_where_its_rate_changes() {
 pub fn shown_at(video: &Path) -> Vec<f64> {
     let told = probe(video, "-select_streams v:0 -show_entries frame=pts_time");
     let times = told.lines().map(|line| line.trim_end_matches(','));
-    // Some frames have a line of their own for what stands beside them.
+    // ffprobe prints an additional empty line for the side data of some frames.
     let times = times.filter(|time| !time.is_empty());
     times.map(|time| time.parse().expect("a time")).collect()
 }
@@ -442,7 +443,7 @@ fn a_cover_before_the_tracks_is_no_track_and_a_name_may_be_no_text() {
         "-i plain.mp4 -i cover.jpg -map 0 -map 1 -c copy -disposition:v:1 attached_pic";
     ffmpeg_in(parent.path(), &format!("{with_cover} behind.mp4"));
     let behind = fs::read(path("behind.mp4")).expect("it was written");
-    // The index is the last box. What it says of the whole file goes before its tracks.
+    // The index is the last box. Its entries about the whole file come before those of the tracks.
     let index = mp4_boxes(&behind).pop().expect("it has boxes");
     let before = &behind[..behind.len() - index.len() + 8];
     let inner = mp4_boxes(&index[8..]).into_iter();

@@ -12,7 +12,7 @@ async fn nothing_is_lost_and_nothing_is_tracked_twice() {
     let app = TestApplication::start().await;
     let frames = &CLIP.frames[1..];
     let expected = CLIP.tracked(5, frames);
-    // A connection carries some five frames, and then it is cut at any place.
+    // A connection carries about five frames, and is then cut at a random byte.
     let frame = CLIP.frames[0].len();
     let lossy = Lossy::before(vec![app.address], frame / 2..10 * frame).await;
     let client = Client::builder(format!("http://{}", lossy.address))
@@ -24,7 +24,7 @@ async fn nothing_is_lost_and_nothing_is_tracked_twice() {
     let mut session = opened.await.unwrap();
     let id = session.id();
     let mut answers = Vec::new();
-    // One by one, and from the middle on in requests with several frames.
+    // The first frames go one by one, later ones in requests with several frames.
     for frame in &frames[..60] {
         answers.push(session.track(frame.clone()).await.unwrap());
     }

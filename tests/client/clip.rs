@@ -1,4 +1,4 @@
-//! The sample clip, and what the library says of it.
+//! The sample clip, and the library's answers to it.
 
 use bagtrack_client::Answer;
 use bagtrack_ingest::Limits;
@@ -7,7 +7,7 @@ use bagtrack_tracker::{Estimate, Preset, Rect, Status, Tracker};
 use serde_json::{Value, json};
 use std::sync::LazyLock;
 
-/// The first frame, and a hundred to be tracked.
+/// The first frame, and a hundred frames to track.
 const FRAMES: u32 = 101;
 
 /// Files of frames, and the box in the first.
@@ -33,7 +33,7 @@ impl Clip {
         [x, y, self.target.width, self.target.height].into()
     }
 
-    /// What the library answers to these frames after the first one.
+    /// The library's answers to these frames after the first one, as the service writes them.
     pub fn tracked(&self, seed: u64, frames: &[Vec<u8>]) -> Vec<Value> {
         let decode = |file: &Vec<u8>| bagtrack_ingest::decode(file, &Limits::default()).unwrap();
         let mut params = Preset::Robust.params();
@@ -65,7 +65,7 @@ fn as_answered(estimate: &Estimate) -> Value {
     })
 }
 
-/// An answer of the client as the service wrote it.
+/// An answer of the client in the service's JSON form.
 pub fn written(answer: &Answer) -> Value {
     serde_json::to_value(answer).unwrap()
 }

@@ -1,4 +1,4 @@
-//! Frames go in, boxes come back: those of the library, and those that the service gives to others.
+//! The client's boxes are those of the library, and those that the service gives to other clients.
 
 use crate::application::{TestApplication, expect};
 use crate::clip::{CLIP, written};

@@ -1,5 +1,5 @@
-//! Services without a store that end: the session goes on from a snapshot or its first frame, at another one or at the
-//! same one after its start, with the same boxes.
+//! Services without a store that end: the session goes on from a snapshot or its first frame, at another service or at
+//! the restarted one, with the same boxes.
 
 use crate::application::TestApplication;
 use crate::clip::{CLIP, written};
@@ -15,7 +15,7 @@ fn replica() -> Replica {
     Replica::start_in(&[("BAGTRACK_SNAPSHOT_KEYS", KEY)], &[])
 }
 
-/// Without a seed: the service draws it.
+/// Opens a session without a seed, so that the service draws one.
 async fn open(client: ClientBuilder) -> Session {
     let client = client.retry_for(Duration::from_secs(120)).build().unwrap();
     let options = OpenOptions::new();
@@ -23,7 +23,7 @@ async fn open(client: ClientBuilder) -> Session {
     opened.await.unwrap()
 }
 
-/// What the library answers to so many frames with the seed of a session.
+/// The library's answers to this number of frames, with the seed of the session.
 async fn expected(address: &str, session: &Session, frames: usize) -> Vec<Value> {
     let view = reqwest::get(format!("{address}/sessions/{}", session.id())).await;
     let view: Value = view.unwrap().json().await.unwrap();
@@ -46,7 +46,7 @@ async fn a_service_that_was_killed_and_started_again_gives_the_same_boxes() {
     let all = expected(&address, &session, 40).await;
     let first = session.id();
     follow(&mut session, 1..=5, &all).await;
-    // There is no snapshot yet: the first frame and the drawn seed open the session again.
+    // There is no snapshot yet: the client opens the session again with the first frame and the drawn seed.
     service.kill();
     service.start_again();
     follow(&mut session, 6..=25, &all).await;
@@ -118,7 +118,7 @@ async fn a_service_that_is_about_to_end_is_left() {
     );
 }
 
-/// The only service ends: the session stays there to the end.
+/// The only service drains: the session stays there to its end.
 #[tokio::test]
 async fn where_nothing_else_is_a_session_stays() {
     let start = |config: &mut Config| config.shutdown_delay = Duration::from_secs(600);
@@ -134,7 +134,7 @@ async fn where_nothing_else_is_a_session_stays() {
 
 #[tokio::test]
 async fn what_was_not_kept_is_lost() {
-    // Without common keys no other process takes the snapshot.
+    // Without common snapshot keys, no other process accepts the snapshot.
     for (every, why) in [(2, "It could not be opened again"), (0, "")] {
         let mut service = Replica::start(&[]);
         let mut session = open(Client::builder(service.url("")).snapshot_every(every)).await;

@@ -1,4 +1,4 @@
-//! What the service refuses: typed problems, and sessions that are as they were.
+//! Refusals of the service are typed problems, and leave the session as it was.
 
 use crate::application::TestApplication;
 use crate::clip::{CLIP, written};

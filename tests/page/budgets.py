@@ -112,7 +112,7 @@ def dropped_folder(checks):
     (folder / "inner").mkdir(parents=True, exist_ok=True)
     for index in range(12):
         into = folder / "inner" if index > 9 else folder
-        # Those of the inner folder come after the others, whose numbers are not padded.
+        # The images of the inner folder come after the others, whose numbers are not padded.
         (into / f"z{index}.jpg").write_bytes(checks.service.bytes(f"/sample/card/{index}.jpg"))
     (folder / "notes.txt").write_text("no image")
     page = checks.page(where="here")

@@ -212,7 +212,7 @@ def phone_by_touch(checks):
     assert width <= 390, f"{width} px wide"
     small = page.evaluate(SMALL, LEAST_TARGET)
     assert not small, small
-    # Phones zoom in on what one writes into with smaller letters.
+    # Phones zoom in on text fields with smaller letters.
     letters = page.locator("#list input[type=text]").evaluate("input => parseFloat(getComputedStyle(input).fontSize)")
     assert letters >= 16, letters
     to_the_end(page)
@@ -327,7 +327,7 @@ def camera(checks):
         page.mouse.up()
         frames(page, 30)
         page.locator("#stop").click()
-        # Its pictures are not kept: the page asks before another source takes its place, and the answer here is no.
+        # The camera's pictures are not kept, so the page asks before another source replaces it. The test answers no.
         page.locator("#sources summary").click()
         page.locator("#card").click()
         said(page, "camera stays")
@@ -406,7 +406,7 @@ def asked_for_a_key(checks):
 def key_needed(checks):
     page, service = asked_for_a_key(checks)
     checks.shot(page, "key-light")
-    # The box stays while one types the key, and until the service has answered.
+    # The box stays while the user types the key, and until the service has answered.
     painted(page, "overlay")
     held = []
     opening = "**/sessions/*?box=*"

@@ -56,7 +56,7 @@ class Clips:
         """A video as phones make it that are held upright: with sound, its pictures lie, and its header says so."""
         path = self.file("phone.mov", 30, H264, turned="transpose=cclock", others=SOUND)
         bytes = bytearray(path.read_bytes())
-        # What is before the matrix in a track's header, and a quarter of a turn clockwise, 16.16.
+        # Skips the fields before the matrix in a track's header; the matrix turns by 90 degrees clockwise, in 16.16.
         begin = bytes.index(b"tkhd") + 4 + 40
         bytes[begin : begin + 20] = struct.pack(">5i", 0, 1 << 16, 0, -1 << 16, 0)
         path.write_bytes(bytes)

@@ -61,14 +61,14 @@ def objects_by_keyboard(checks):
         page.keyboard.press("Enter")
         page.get_by_label(f"Delete {left}").wait_for()
         assert page.evaluate(FOCUS) == f"Delete {left}", page.evaluate(FOCUS)
-    # One that comes back has the focus: Enter would delete the one beside it.
+    # A restored object gets the focus: otherwise Enter would delete the one beside it.
     page.keyboard.press("Control+z")
     page.get_by_label("Delete bus").wait_for()
     assert page.evaluate(FOCUS) == "Choose bus", page.evaluate(FOCUS)
     page.locator("#list button.remove").nth(1).focus()
     page.keyboard.press("Enter")
     page.get_by_label("Delete bus").wait_for(state="detached")
-    # An object that comes back does not take the focus from a name.
+    # A restored object does not take the focus from a name field.
     names.nth(1).focus()
     page.locator("#undo").evaluate("button => button.click()")
     page.keyboard.type("!")
@@ -77,7 +77,7 @@ def objects_by_keyboard(checks):
     stored = json.loads(saved(page, "#save-project"))["objects"]
     assert sorted(found["name"] for found in stored) == ["bus", "cat!?", "van"], stored
     checks.no_axe_violations(page, "objects")
-    # After a click Space is the page's, and deletes no other one.
+    # After a click, Space is the page's shortcut, and deletes no other object.
     page.locator("#list button.remove").first.click()
     page.keyboard.press("Space")
     assert page.locator("#list li").count() == 2
@@ -92,7 +92,7 @@ def focus_in_the_list(checks):
     drag(page, checks.clips["card"]["truth"][0])
     frames(page, 20)
     page.locator("#pause").click()
-    # No picture of the clip is on its way any more: it would count as one of those that are let through.
+    # Waits until no request for a picture is open: it would count as one of those that are let through.
     kept_rows(page)
     to_frame(page, 10)
     release = held(page, 5)
@@ -257,7 +257,7 @@ def box_of_another_source(checks):
         page.locator("#picture").focus()
         begin(page)
         say_nothing(page)
-        # As a file that is dropped: a click would take the focus.
+        # Opens the clip by script, as a dropped file would: a click would take the focus.
         page.evaluate("document.getElementById('leaves').click()")
         said(page, DRAW)
         page.mouse.move(520, 510)

@@ -142,7 +142,7 @@ def undone_with_frames_on_their_way(checks):
     frames(page, 20)
     service.process.send_signal(signal.SIGSTOP)
     try:
-        # Frames come for a moment yet, and are not answered.
+        # Frames come for another moment, and are not answered.
         page.wait_for_timeout(300)
         page.locator("#pause").click()
         drag(page, OFF)
@@ -220,7 +220,7 @@ def no_object_left(checks):
         page.get_by_role("button", name="Delete Object 1").click()
         said(page, DRAW)
         shown = int(page.locator("#frames").inner_text())
-        # Time in which frames would go past.
+        # Long enough for frames to go past, if the page did not wait.
         page.wait_for_timeout(1000)
         drag(page, OFF)
         frames(page, shown + 20)
@@ -353,7 +353,7 @@ def added_over_a_slow_line(checks):
     with page.expect_request(opening):
         drag(page, OFF)
     page.locator("#pause").click()
-    # Time in which frames would go past it.
+    # Long enough for frames to go past it, if the page did not wait.
     page.wait_for_timeout(1000)
     held[0].continue_()
     to_the_end(page)
@@ -380,7 +380,7 @@ def added_and_undone_at_once(checks):
     """A new object that is undone while its session is opened does not come."""
     page, held = added_to_a_paused_clip(checks)
     page.keyboard.press("Control+z")
-    # Time in which a page would be done that does not wait for the answer.
+    # Long enough for a page to finish that does not wait for the answer.
     page.wait_for_timeout(500)
     with page.expect_response(OPENING):
         held[0].continue_()

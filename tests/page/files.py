@@ -64,7 +64,7 @@ def check_video(video, numbers, seconds, size=SENT):
     shown = frame_numbers(video, *size)
     assert shown == numbers, shown
     middle = video.with_suffix(".middle.png")
-    # The input is entered at a key frame and read from there.
+    # With `-ss` before `-i`, ffmpeg seeks to a key frame and decodes from there.
     run("ffmpeg", "-v", "error", "-y", "-ss", duration / 2, "-i", video, "-frames:v", "1", middle)
     [entered] = frame_numbers(middle, *size)
     assert abs(entered - (numbers[0] + numbers[-1]) / 2) <= 2, entered
@@ -139,7 +139,7 @@ def whole_file(checks, path, rate):
     assert told == [path.name, *SIZE, 0] and abs(stored["frame_rate"] - rate) < 0.01, told
     assert [row["x"] for row in stored["boxes"]] == [float(row["x"]) for row in table]
     check_video(saved_video(checks, page, f"saved-{rate}.webm"), numbers, FRAMES / rate)
-    # Making the video took a while: nothing has come since the end.
+    # While the video was made, no more rows came.
     assert rows(page) == table
     assert page.locator("#stage video").count() == 0
     page.context.close()
@@ -148,7 +148,7 @@ def whole_file(checks, path, rate):
 def spoiled(checks, page, path, spoil):
     """A file that is removed or changed after some frames is to be chosen again."""
     choose_file(page, path)
-    # Else the file may have ended, or all of it be read, before it is spoiled.
+    # Holds the file back: otherwise all of it may be read before the test damages it.
     release = held_file(page, 20)
     drag(page, sent_box(checks.files.truth[0]))
     frames(page, 8)
@@ -377,7 +377,7 @@ def file_gone_over_plain_http(checks):
     browser = checks.launch("--host-resolver-rules=MAP machine.test 127.0.0.1")
     url = f"http://machine.test:{service.port}"
     path = holed_file(checks, "gone.mp4")
-    # Browsers look at the second in which it was changed last.
+    # Browsers notice a change by the file's modification time, in seconds.
     for spoil in (path.unlink, lambda: os.utime(path, (1, 1))):
         page = checks.page(url=url, browser=browser, where="here", allowed=("Cross-Origin-Opener-Policy", "Failed to load"))
         spoiled(checks, page, path, spoil)

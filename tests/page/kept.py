@@ -86,7 +86,7 @@ def renamed_and_reloaded(checks):
 def offers(page, names):
     """Waits until a page offers to go on with these, newest first."""
     for _ in range(50):
-        # As if it was looked at again.
+        # As if the user had returned to the tab.
         page.evaluate("() => void document.dispatchEvent(new Event('visibilitychange'))")
         page.wait_for_timeout(300)
         texts = page.locator("#works li").all_inner_texts()
@@ -177,14 +177,14 @@ def left_for_another_source(checks):
 def no_room_for_the_file(checks):
     """A file for which the browser has no room is not kept: its rows are, and all that was kept before."""
     path = checks.files.folder / "large.mp4"
-    # A box of nothing at its end makes it large.
+    # An empty MP4 box at the end makes the file large.
     nothing = LARGE.to_bytes(4, "big") + b"free" + bytes(LARGE - 8)
     path.write_bytes(checks.files.file("clip.mp4", 30, H264).read_bytes() + nothing)
     page = checks.page(where="here")
     other = page.context.new_page()
     other.goto(page.url)
     browser = other.context.new_cdp_session(other)
-    # The browser looks at it only now and then: it has to be there from the beginning.
+    # The browser reads the quota only now and then, so it is set at the beginning.
     browser.send("Storage.overrideQuotaForOrigin", {"origin": checks.service.url, "quotaSize": LARGE})
     kept_run(checks, page)
     page.close()

@@ -60,7 +60,7 @@ def file_in_the_page(checks):
     assert not uploads.calls, uploads.calls
     page.context.close()
     box = ",".join(str(value) for value in numbers(table[0]))
-    # The page draws a seed of its own, so its rows are compared with those of some seeds.
+    # The page draws its seed at random, so its rows are compared with those of several seeds.
     compared = [with_track(checks, path, box, seed, table) for seed in range(8)]
     means = [sum(overlaps) / len(overlaps) for overlaps in compared]
     print(f"  mean overlap with `bagtrack track` of eight seeds {min(means):.4f} to {max(means):.4f}")

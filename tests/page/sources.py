@@ -177,7 +177,7 @@ def recorded_in_a_browser(checks):
         assert len(times) > 10, times
         told = [float(row["time"]) for row in table]
         assert len(told) == len(times) and max(map(abs, map(float.__sub__, told, times))) < 0.0015, (told, times)
-        # It moves 20 pixels a second. A busy machine draws its last frame earlier.
+        # The target moves 20 pixels a second. On a busy machine, the last frame is drawn earlier.
         assert times[-1] > 1 and abs(float(table[-1]["x"]) - 100 - 20 * times[-1]) < 6, (kind, table[-1])
     page.context.close()
 

@@ -143,7 +143,7 @@ def drawn_as_it_goes_on(checks):
     for where in ("here", "there"):
         page = checks.page(where=where)
         choose_file(page, checks.files.file("clip.mp4", 30, H264))
-        # It waits there: it cannot have ended when it is stopped.
+        # The source waits there, so it cannot have ended when the test stops it.
         rest = held_file(page, FRAMES // 2)
         drag(page, sent_box(checks.files.truth[0]))
         frames(page, 20)
@@ -157,7 +157,7 @@ def drawn_as_it_goes_on(checks):
         drag(page, sent_box(checks.files.truth[last]))
         page.locator("#cancel").wait_for()
         file()
-        # It would be open now, and go on beside.
+        # Long enough for the other source to open and go on, if it were not dropped.
         page.wait_for_timeout(1000)
         picture()
         to_the_end(page)
@@ -295,7 +295,7 @@ def deleted_as_it_goes_on(checks):
             page.locator(f"#list li:nth-child({at + 2})").wait_for()
         page.locator("#stop").click()
         kept_rows(page)
-        # Two are read as the clip is opened anew.
+        # Opening the clip again reads two pictures.
         release = held(page, 2)
         page.locator("#resume").click()
         is_held(page)
@@ -452,12 +452,12 @@ def played_again(checks):
     said(page, "Stopped")
     table = kept_rows(page)
     at = lambda: int(page.locator("#timeline").get_attribute("aria-valuenow"))
-    # It waits for the sixth picture: it plays when it is paused.
+    # The clip waits for the sixth picture, so it still plays when the test pauses it.
     release = held(page, 5)
     page.keyboard.press("Space")
     page.wait_for_function(PLAYS, arg=len(table) - 1)
     page.keyboard.press("Space")
-    # What was shown last is told with the next picture of the screen.
+    # The page is updated with the next repaint of the screen.
     page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
     paused = at()
     release()

@@ -185,7 +185,7 @@ def check_exports(page, table):
         for box in region["value"]["sequence"]:
             scaled = [box["x"] * 4.8, box["y"] * 3.6, box["width"] * 4.8, box["height"] * 3.6]
             found[box["frame"] - 1, int(region["id"].split("-")[1]) - 1] = scaled
-    # An object that is lost has no box of its own there.
+    # Label Studio has no box for frames in which an object is lost.
     assert task["data"] == {"video": "card"} and told.keys() <= found.keys(), told.keys() - found.keys()
     same(found, 0.01)
 
@@ -225,7 +225,7 @@ def tracked_backwards(checks):
     shown(page, 0)
     page.locator("#undo").click()
     said(page, "is undone")
-    # The last one is shown: the one that was is gone.
+    # Undoing has removed the frame on the screen, so the last frame is shown.
     shown(page, KEY + len(before) - 1)
     assert page.locator("#frames").inner_text() == str(len(before)) and values(rows(page)) == values(before)
     page.locator("#timeline").focus()
@@ -271,7 +271,7 @@ def panel_of_a_new_source(checks):
     held = []
     page.route("**/sessions/*?*box=*", lambda route: held.append(route))
     page.locator("#there").evaluate("button => button.click()")
-    # Its sources are in a menu by now.
+    # The buttons of the sources are in a closed menu at this point.
     page.evaluate("document.getElementById('leaves').click()")
     said(page, "Draw a box around what to follow")
     with page.expect_request("**/sessions/*?*box=*"):

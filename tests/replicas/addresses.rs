@@ -18,12 +18,12 @@ fn run(command: &mut Command) {
     assert!(output.status.success(), "{command:?}: {output:?}");
 }
 
-/// Two replicas with this store take the frames of some sessions in turns.
+/// Tracks some sessions at two replicas with this store, which take the frames in turns.
 async fn replicas_share_sessions(environment: &[(&str, &str)], store: &str) {
     let replica = || Replica::start_in(environment, &["--store", store]);
     let (replicas, clip, client) = ([replica(), replica()], Clip::of(0, FRAMES), Client::new());
     for replica in &replicas {
-        // On a busy machine the store may be found late.
+        // On a busy machine, connecting to the store may take a while.
         let found = async { while replica.readiness().await != StatusCode::OK {} };
         within(found, "the store is found").await;
     }
@@ -88,7 +88,7 @@ async fn a_store_behind_tls_whose_certificate_is_checked() {
     let _server = redis_server(folder.path(), port, &flags);
     let url = format!("rediss://127.0.0.1:{port}");
     replicas_share_sessions(&[("SSL_CERT_FILE", &certificate)], &url).await;
-    // Nobody known has signed it.
+    // A replica without the root refuses the store's certificate.
     let wary = Replica::with_store(&url, &[]);
     assert_eq!(wary.readiness().await, StatusCode::SERVICE_UNAVAILABLE);
 }
@@ -116,7 +116,7 @@ async fn a_store_of_three_nodes() {
     create.args(["--cluster", "create"]);
     create.args(nodes.iter().map(|(_, port)| format!("127.0.0.1:{port}")));
     run(create.arg("--cluster-yes"));
-    // A node that just started refuses keys for two seconds, however complete the cluster is.
+    // A node that has just started refuses keys for two seconds, even if the cluster is complete.
     for (_, port) in &nodes {
         while !ask_redis(*port, &["cluster", "info"]).contains("cluster_state:ok") {
             std::thread::yield_now();

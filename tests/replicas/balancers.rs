@@ -5,14 +5,14 @@ use std::net::SocketAddr;
 use std::process::Command;
 use tempfile::TempDir;
 
-/// What stands before the replicas.
+/// A load balancer before the replicas; it ends when this is dropped.
 pub struct Balancer {
     _process: Process,
     _folder: TempDir,
     pub address: SocketAddr,
 }
 
-/// A configuration of docker/, where each of these texts is another one.
+/// A configuration of docker/, with each of these texts replaced by another one.
 fn shipped(name: &str, changes: &[(&str, String)]) -> String {
     let path = format!("{}/docker/{name}", env!("CARGO_MANIFEST_DIR"));
     let mut text = std::fs::read_to_string(&path).expect("it is shipped");
@@ -38,7 +38,7 @@ pub fn haproxy(replicas: &[SocketAddr]) -> Balancer {
     haproxy_with(replicas, &[])
 }
 
-/// HAProxy, where each of these texts is another one too.
+/// HAProxy, with further texts of its configuration replaced.
 pub fn haproxy_with(replicas: &[SocketAddr], changes: &[(&str, String)]) -> Balancer {
     let (folder, port) = (tempfile::tempdir().unwrap(), free_port());
     let servers = replicas.iter().enumerate();
@@ -79,7 +79,7 @@ pub fn nginx(replicas: &[SocketAddr]) -> Balancer {
     let file = folder.path().join("nginx.conf");
     std::fs::write(&file, text).unwrap();
     let mut command = Command::new("nginx");
-    // Its workers would outlive a master that is killed.
+    // One process: if a master were killed, its workers would go on.
     command.arg("-c").arg(file);
     command.args(["-g", "daemon off; master_process off;"]);
     start(&mut command, folder, port)

@@ -1,4 +1,4 @@
-//! Requests that a replica reads and does not answer: which ones the configurations of docker/ send to another one.
+//! Requests that a replica reads without answering: the configurations of docker/ send some of them to another one.
 
 use crate::balancers::{Balancer, haproxy, nginx};
 use std::io::{Read, Write};
@@ -9,7 +9,8 @@ use std::thread;
 
 const BODY: &[u8] = &[b'x'; 100];
 
-/// A replica that reads requests and breaks off, but says that it is ready. It ends with the test's process.
+/// A false replica that reports that it is ready, but closes the connection after it has read a request. It ends with
+/// the process of the test.
 fn breaks_off(read: &Arc<AtomicUsize>) -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -33,10 +34,10 @@ fn breaks_off(read: &Arc<AtomicUsize>) -> SocketAddr {
     address
 }
 
-/// How many replicas read this request, and the status that its sender gets.
+/// How many replicas read this request, and the status of the balancer's answer.
 fn readers(balance: fn(&[SocketAddr]) -> Balancer, method: &str, path: &str) -> (usize, u16) {
     let read = Arc::new(AtomicUsize::new(0));
-    // Anew for each request: a replica that broke off is left out for a while.
+    // A new balancer for each request: it avoids a replica for a while after it broke off.
     let front = balance(&[(); 3].map(|()| breaks_off(&read)));
     let mut stream = TcpStream::connect(front.address).unwrap();
     let length = BODY.len();
@@ -52,7 +53,7 @@ fn readers(balance: fn(&[SocketAddr]) -> Balancer, method: &str, path: &str) -> 
     (read.load(Ordering::Relaxed), status.parse().unwrap())
 }
 
-/// Without a number a frame counts each time that a replica has it.
+/// A frame without a number would be tracked again by each replica that gets it.
 fn a_frame_without_a_number_goes_to_one_replica_alone(balance: fn(&[SocketAddr]) -> Balancer) {
     for (method, path) in [
         ("PUT", "/sessions/a/target?box=1,2,30,40"),
@@ -67,7 +68,7 @@ fn a_frame_without_a_number_goes_to_one_replica_alone(balance: fn(&[SocketAddr])
 #[ignore = "needs nginx"]
 fn a_frame_without_a_number_goes_to_one_replica_alone_behind_nginx() {
     a_frame_without_a_number_goes_to_one_replica_alone(nginx);
-    // A session that is opened twice is one: this goes on to the others.
+    // Opening a session by its id is idempotent, so nginx sends it to the other replicas.
     assert_eq!(readers(nginx, "PUT", "/sessions/a"), (3, 502));
 }
 

@@ -1,6 +1,6 @@
-//! Three replicas, a Redis and lossy networks, while replicas are killed and Redis is started again.
+//! Three replicas, a Redis and lossy networks. Replicas are killed, and Redis is restarted.
 //!
-//! No track is lost, no answered frame is lost, and every box is that of an undisturbed run.
+//! No track and no answered frame is lost, and every box equals that of an undisturbed run.
 
 use crate::balancers::{haproxy, nginx};
 use crate::clip::Clip;
@@ -12,13 +12,13 @@ use rand::RngExt;
 use std::net::SocketAddr;
 use std::sync::atomic::Ordering;
 
-/// A number that the environment may set.
+/// A number from a variable of the environment, or the default.
 pub fn setting(name: &str, default: usize) -> usize {
     let text = std::env::var(name).ok();
     text.map_or(default, |text| text.parse().expect("a number"))
 }
 
-/// Kills and starts replicas, and Redis, while the clients go on.
+/// Kills and restarts replicas and Redis while the clients go on.
 async fn disturb(tracks: &mut Tracks, replicas: &mut [Replica], redis: &mut Redis, all: usize) {
     const STEPS: usize = 12;
     for step in 1..STEPS {
@@ -42,7 +42,7 @@ async fn disturb(tracks: &mut Tracks, replicas: &mut [Replica], redis: &mut Redi
     }
 }
 
-/// Runs the clients through what `front` puts before the replicas.
+/// Runs the clients, which connect to the balancer or proxy that `front` makes.
 async fn run<F>(front: impl FnOnce(Vec<SocketAddr>) -> F, keeps_connections: bool)
 where
     F: Future<Output = (SocketAddr, Box<dyn Send>)>,
@@ -59,7 +59,7 @@ where
     let replica = || Replica::with_store(&url, &flags);
     let mut replicas = vec![replica(), replica(), replica()];
     let (address, _front) = front(replicas.iter().map(|replica| replica.address).collect()).await;
-    // A connection for one frame is cut in the middle of it, or not at all.
+    // After how many bytes a connection is cut; if it carries one frame only, in the middle of that or not at all.
     let bytes = match keeps_connections {
         true => 20 << 10..500 << 10,
         false => 1 << 10..400 << 10,
@@ -81,7 +81,7 @@ where
 #[ignore = "needs redis"]
 async fn no_track_is_lost_in_round_robin() {
     let front = async |replicas| {
-        // Connections in turns, and a connection for every frame.
+        // Connections go to the replicas in turns, and each frame has its own connection.
         let turns = Lossy::before(replicas, usize::MAX - 1..usize::MAX).await;
         (turns.address, Box::new(turns) as Box<dyn Send>)
     };

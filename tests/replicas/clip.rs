@@ -1,4 +1,4 @@
-//! What the clients upload: real videos where they are, else the project's sample clip.
+//! The clips that clients upload: real videos from the folder `BAGTRACK_SEQUENCES`, or else the sample clip.
 
 use bagtrack_sample::{Clip as Sample, Settings};
 use bagtrack_tracker::Rect;
@@ -6,7 +6,7 @@ use image::ImageFormat;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-/// The files of a video, and the first box.
+/// The frames of a video as image files, and the box in the first one.
 #[derive(Clone)]
 pub struct Clip {
     pub frames: Vec<Vec<u8>>,
@@ -14,7 +14,7 @@ pub struct Clip {
 }
 
 impl Clip {
-    /// The clip of a client, with so many frames.
+    /// The clip of a client, with this number of frames, the first one included.
     pub fn of(client: usize, frames: usize) -> Self {
         match std::env::var_os("BAGTRACK_SEQUENCES") {
             Some(root) => Self::video(&PathBuf::from(root), client, frames),
@@ -22,7 +22,7 @@ impl Clip {
         }
     }
 
-    /// The clips of so many clients, each with so many frames after the first.
+    /// The clips of this number of clients, each with this number of frames after the first.
     pub fn of_each(clients: usize, frames: usize) -> Vec<Self> {
         (0..clients)
             .map(|client| Self::of(client, frames + 1))

@@ -7,7 +7,7 @@ use crate::replica::Replica;
 use crate::tracking_client::Track;
 use reqwest::{Client, Response, StatusCode};
 
-/// Up to which frame the store has the session.
+/// The header `Checkpoint`: the frame up to which the store has the session.
 fn checkpoint(answer: &Response) -> Option<&str> {
     let value = answer.headers().get("checkpoint")?;
     Some(value.to_str().unwrap())
@@ -17,7 +17,7 @@ async fn until_ready(replica: &Replica, status: StatusCode) {
     while replica.readiness().await != status {}
 }
 
-/// After the end of a replica: the Rust client keeps those frames.
+/// After a replica has ended, its frames since the checkpoint are asked for again; the Rust client keeps them.
 #[tokio::test]
 #[ignore = "needs redis"]
 async fn the_client_sends_the_frames_after_the_checkpoint_again() {
@@ -63,11 +63,11 @@ async fn a_replica_that_lost_a_session_to_another_goes_on_from_the_store() {
     let pair = Pair::open(&["--store-every", "4"], 20).await;
     let expected = pair.undisturbed().await;
     pair.take(0, 1..7).await;
-    // The second takes over at the checkpoint; the first still has frames 5 and 6 in memory.
+    // The second replica takes over at the checkpoint. The first still has frames 5 and 6 in memory.
     let early = json(pair.post(1, 7).await, StatusCode::CONFLICT).await;
     assert_eq!(early["expected_frame"], 5);
     pair.follow(1, 5..7, &expected).await;
-    // The first's frame 6 is another's now.
+    // The second replica has the session, so frame 6 in the first one's memory does not count any more.
     let stale = json(pair.post(0, 7).await, StatusCode::CONFLICT).await;
     assert_eq!(stale["expected_frame"], 5);
     pair.follow(0, 5..20, &expected).await;
@@ -77,7 +77,7 @@ async fn a_replica_that_lost_a_session_to_another_goes_on_from_the_store() {
 #[ignore = "needs redis"]
 async fn a_frame_that_comes_late_to_another_replica_takes_nothing_back() {
     let pair = Pair::open(&["--store-every", "10"], 20).await;
-    // The second has the first frame.
+    // The second replica has only the first frame of the session, so it expects frame 1.
     let early = json(pair.post(1, 19).await, StatusCode::CONFLICT).await;
     assert_eq!(early["expected_frame"], 1);
     pair.take(0, 1..15).await;

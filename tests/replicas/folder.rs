@@ -1,4 +1,4 @@
-//! One process with its store in a folder: killed, on a full disk, and beside another one.
+//! One process with its store in a folder: it is killed, its disk is full, or another process has the folder.
 
 use crate::chaos::setting;
 use crate::clip::Clip;
@@ -18,7 +18,7 @@ use std::process::Command;
 use std::time::Duration;
 use tempfile::TempDir;
 
-/// A folder, and the setting that names it.
+/// A temporary folder, and the value of `--store` that names it.
 fn folder() -> (TempDir, String) {
     let folder = tempfile::tempdir().expect("a folder");
     let setting = format!("file:{}", folder.path().join("sessions").display());
@@ -28,8 +28,8 @@ fn folder() -> (TempDir, String) {
 /// How often the process is killed.
 const KILLS: usize = 6;
 
-/// Clients go on through `kill -9`: no track and no answered frame is lost, and all boxes are those of an undisturbed
-/// run.
+/// Clients go on while the process is killed by SIGKILL: no track and no answered frame is lost, and all boxes equal
+/// those of an undisturbed run.
 async fn goes_on_when_killed(durability: &str, (clients, frames): (usize, usize)) {
     let clips = Clip::of_each(clients, frames);
     let expected = undisturbed(&clips).await;
@@ -63,7 +63,7 @@ async fn a_process_that_syncs_each_answer_goes_on_from_its_folder() {
     goes_on_when_killed("each", (6, 40)).await;
 }
 
-/// What a process says that does not start.
+/// The message of a process that must not start with these flags.
 fn refusal(flags: &[&str]) -> String {
     let mut command = Command::new(program("bagtrack"));
     command
@@ -103,7 +103,7 @@ fn a_setting_that_names_no_store_is_refused() {
     }
 }
 
-/// A process whose files may grow to a limit that can be moved. Writes above it fail as they do on a full disk.
+/// A process with an adjustable limit on the size of its files. Writes beyond it fail as on a full disk.
 struct Limited(Program);
 
 impl Limited {
@@ -113,7 +113,7 @@ impl Limited {
         Self(Program::spawn(command.args(SECRET)).expect("it listens"))
     }
 
-    /// None is no limit.
+    /// Sets the limit in bytes; `None` removes it.
     fn limit(&self, bytes: Option<u64>) {
         let pid = Pid::from_raw(i32::try_from(self.0.process_id()).unwrap());
         let limit = Rlimit {
@@ -129,7 +129,7 @@ impl Limited {
     }
 }
 
-/// A process whose store is on a disk of its own, in memory, which nobody else sees.
+/// A process with its store on a disk in memory, mounted in a namespace of its own.
 fn on_a_disk_of(megabytes: usize, folder: &Path) -> Program {
     let mut command = Command::new("unshare");
     command.args(["--map-root-user", "--mount", "sh", "-c"]);
@@ -150,7 +150,7 @@ async fn on_a_nearly_full_disk_sessions_are_refused_and_frames_are_taken() {
     let process = on_a_disk_of(256, folder.path());
     let base = process.url("");
     let mut track = Track::open(base.clone(), Client::new(), 0, clip.clone()).await;
-    // The disk, as the process sees it.
+    // The path of the disk, through the process's view of the file system.
     let disk = PathBuf::from(format!("/proc/{}/root", process.process_id()));
     let disk = disk.join(folder.path().strip_prefix("/").unwrap());
     let mut filler = File::create(disk.join("filler")).unwrap();
@@ -195,7 +195,7 @@ fn journal_bytes(folder: &TempDir) -> u64 {
     lengths.max().unwrap()
 }
 
-/// The next frame is answered 503.
+/// Checks that the next frame gets status 503.
 async fn refuses_frame(sessions: &str, track: &Track, clip: &Clip) {
     let number = track.answers.len() + 1;
     let url = format!("{sessions}/{}/frames?frame={number}", track.id());
@@ -204,7 +204,7 @@ async fn refuses_frame(sessions: &str, track: &Track, clip: &Clip) {
     assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
 }
 
-/// An empty store was made in place of the one that was gone, and all sessions were told to be lost.
+/// An empty store in place of the missing one would make all sessions count as lost.
 #[tokio::test]
 async fn a_folder_whose_disk_has_gone_is_not_made_anew() {
     let clip = Clip::of(0, 12);
@@ -215,7 +215,7 @@ async fn a_folder_whose_disk_has_gone_is_not_made_anew() {
     while track.answers.len() < 5 {
         track.advance().await;
     }
-    // Its writes fail, as those of a disk that goes.
+    // Makes writes fail, as when a disk goes away.
     replica.limit(Some(0));
     refuses_frame(&replica.0.url("/sessions"), &track, &clip).await;
     let (sessions, elsewhere) = (folder.path().join("sessions"), folder.path().join("disk"));
@@ -227,7 +227,7 @@ async fn a_folder_whose_disk_has_gone_is_not_made_anew() {
     assert_eq!(answer.status(), StatusCode::SERVICE_UNAVAILABLE);
     let told = answer.text().await.unwrap();
     assert!(told.contains("The store of the sessions"), "{told}");
-    // The mount point is there again, the disk is not.
+    // The empty mount point is there again, without the disk.
     std::fs::create_dir(&sessions).unwrap();
     replica.0.logs("not there any more");
     std::fs::remove_dir(&sessions).unwrap();
@@ -238,7 +238,7 @@ async fn a_folder_whose_disk_has_gone_is_not_made_anew() {
     assert_eq!(track.answers, answers);
 }
 
-/// The frames that came after it were answered 200, and were gone with it.
+/// Frames that are answered with 200 after the removal would be lost.
 #[tokio::test]
 async fn a_folder_that_is_removed_takes_no_frames() {
     let clip = Clip::of(0, 12);
@@ -277,7 +277,7 @@ async fn on_a_full_disk_frames_are_refused_and_nothing_is_lost() {
         while track.answers.len() < full {
             track.advance().await;
         }
-        // One more may fit.
+        // Room for about one more frame.
         replica.limit(Some(journal_bytes(&folder) + (48 << 10)));
         let url = replica.0.url(&format!("/sessions/{}/frames", track.id()));
         let mut refused = None;
@@ -303,7 +303,7 @@ async fn on_a_full_disk_frames_are_refused_and_nothing_is_lost() {
         replica.limit(None);
         while replica.readiness().await != StatusCode::OK {}
     }
-    // The client goes on: a frame that was answered meanwhile gets the same answer again.
+    // The client goes on: for a frame that the loop above has sent with success, it gets the stored answer.
     while track.advance().await {}
     assert!(!track.went_back());
     assert_eq!(track.answers, answers);

@@ -1,4 +1,4 @@
-//! What the configurations of docker/ tell the service of a request: the host that it names, and its client.
+//! What the configurations of docker/ forward to the service: the host of a request, and the address of its client.
 
 use crate::balancers::{Balancer, haproxy, haproxy_with, nginx};
 use crate::clip::Clip;
@@ -10,7 +10,7 @@ use std::time::Duration;
 
 type Balance = fn(&[SocketAddr]) -> Balancer;
 
-/// Three replicas with these flags, and what stands before them.
+/// Three replicas with these flags, and a balancer before them.
 fn behind(balance: Balance, flags: &[&str]) -> ([Replica; 3], Balancer) {
     let replicas = [(); 3].map(|()| Replica::start(flags));
     let front = balance(&replicas.each_ref().map(|replica| replica.address));
@@ -27,7 +27,7 @@ async fn open(front: &Balancer, headers: &[(&str, &str)]) -> Response {
     request.send().await.unwrap()
 }
 
-/// A browser that asks over plain HTTP names no `Sec-Fetch-Site`: the host and its port are all there is to compare.
+/// Over plain HTTP, browsers send no `Sec-Fetch-Site`, so the service can compare only `Origin` with host and port.
 async fn pages_of_the_same_port_alone_may_call(balance: Balance) {
     let (_replicas, front) = behind(balance, &[]);
     let own = format!("http://{}", front.address);
@@ -53,7 +53,8 @@ async fn pages_of_the_same_port_alone_may_call_behind_haproxy() {
     pages_of_the_same_port_alone_may_call(haproxy).await;
 }
 
-/// Each of three replicas lets a client have one session: the fourth is refused, whoever the client says it is.
+/// Each of three replicas allows a client one session: the fourth is refused, even if the client sends a false
+/// `X-Forwarded-For`.
 async fn a_client_cannot_name_itself_another(balance: Balance) {
     let flags = ["--trusted-proxies", "127.0.0.0/8", "--client-sessions", "1"];
     let (_replicas, front) = behind(balance, &flags);
@@ -83,7 +84,7 @@ async fn a_client_cannot_name_itself_another_behind_haproxy() {
     a_client_cannot_name_itself_another(haproxy).await;
 }
 
-/// With a smaller bound: so many connections would need a higher limit of open files than tests have.
+/// Tested with a smaller bound than the configuration's, which would need more open files than tests may have.
 #[test]
 #[ignore = "needs redis and haproxy"]
 fn one_source_has_so_many_connections_at_haproxy() {
@@ -104,6 +105,6 @@ fn one_source_has_so_many_connections_at_haproxy() {
         }
     };
     let closed = silent.iter().filter(|stream| is_closed(stream)).count();
-    // The one that found out when HAProxy listens may be gone or not.
+    // The probe that waited for HAProxy to listen may count, or be closed already.
     assert!((4..=5).contains(&closed), "{closed}");
 }

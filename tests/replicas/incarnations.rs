@@ -1,4 +1,4 @@
-//! Sessions that have one id after the other.
+//! Sessions with the same id, one after the other.
 
 use crate::clip::Clip;
 use crate::pair::{Pair, json};
@@ -15,7 +15,7 @@ async fn a_request_to_open_a_session_is_compared_with_the_one_that_has_the_id_no
     let ended = pair.client.delete(pair.url(1, "")).send().await.unwrap();
     assert_eq!(ended.status(), StatusCode::NO_CONTENT);
     let opened = json(pair.put(1, 8).await, StatusCode::CREATED).await;
-    // The first replica still has the session that was ended.
+    // The first replica still has the ended session in memory.
     let again = pair.put(0, 8).await;
     assert_eq!(again.headers()["replayed"], "true");
     assert_eq!(json(again, StatusCode::CREATED).await, opened);
@@ -49,7 +49,7 @@ async fn an_id_that_another_owner_has_now_is_found_where_the_old_session_was() {
         json(put(&first, id, ANN).await, StatusCode::CREATED).await;
         assert_eq!(end(&second, id, ANN).await, StatusCode::NO_CONTENT);
         json(put(&second, id, BEN).await, StatusCode::CREATED).await;
-        // The first replica still has Ann's, which ends nothing of Ben's.
+        // The first replica still has Ann's session in memory; ending that must not end Ben's.
         if ann_tries_to_end_it {
             assert_eq!(end(&first, id, ANN).await, StatusCode::NOT_FOUND);
         }

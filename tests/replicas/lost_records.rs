@@ -1,5 +1,5 @@
-//! The store forgets sessions: it keeps nothing on a disk, or it was out of reach for longer than they live without a
-//! frame. They are gone then, and say so; clients open them again from a snapshot.
+//! The store loses sessions: it has no disk, or was out of reach for longer than idle sessions live. The service then
+//! answers that they are gone, and clients open them again from a snapshot.
 
 use crate::pair::{Pair, json};
 use crate::stream_client::{Received, StreamClient};
@@ -20,7 +20,7 @@ async fn a_session_that_the_store_has_lost_is_gone_at_all_replicas() {
     json(pair.post(1, 2).await, StatusCode::OK).await;
     json(pair.post(0, 3).await, StatusCode::OK).await;
     pair.redis.ask(&["flushall"]);
-    // The first replica has the state that the frame follows, in memory.
+    // The first replica has the session's state in memory, but not the store.
     let lost = json(pair.post(0, 4).await, StatusCode::NOT_FOUND).await;
     let detail = lost["detail"].as_str().unwrap();
     assert!(detail.contains("lost"), "{detail}");

@@ -1,4 +1,4 @@
-//! Two replicas, and a session of theirs.
+//! Two replicas that share a session through a Redis.
 
 use crate::clip::Clip;
 use crate::processes::Redis;
@@ -27,7 +27,7 @@ impl Pair {
         Self::of([&program, &program], flags, frames).await
     }
 
-    /// Two replicas, each of its build of the program.
+    /// Two replicas, each with its own build of the program.
     pub async fn of(programs: [&Path; 2], flags: &[&str], frames: usize) -> Self {
         let redis = Redis::start();
         let url = redis.url();
@@ -39,13 +39,13 @@ impl Pair {
             clip: Clip::of(0, frames),
             id: Uuid::new_v4(),
         };
-        // On a busy machine the store may be found late.
+        // On a busy machine, connecting to the store may take a while.
         while pair.put(0, 7).await.status() == StatusCode::SERVICE_UNAVAILABLE {}
         json(pair.put(0, 7).await, StatusCode::CREATED).await;
         pair
     }
 
-    /// The answers of a service without a store.
+    /// The answers of a single service without a store to the same frames.
     pub async fn undisturbed(&self) -> Vec<Answer> {
         let alone = Replica::start(&[]);
         let track = Track::open(alone.url(""), Client::new(), 7, self.clip.clone());
@@ -67,14 +67,14 @@ impl Pair {
         self.post_as(replica, number, number).await
     }
 
-    /// Posts these frames to a replica, which takes them.
+    /// Posts these frames to a replica, which must accept them.
     pub async fn take(&self, replica: usize, numbers: Range<usize>) {
         for number in numbers {
             json(self.post(replica, number).await, StatusCode::OK).await;
         }
     }
 
-    /// Posts these frames to a replica, whose answers are those that are expected from frame 1 on.
+    /// Posts these frames to a replica, and checks its answers. `expected` begins with frame 1.
     pub async fn follow(&self, replica: usize, numbers: Range<usize>, expected: &[Answer]) {
         for number in numbers {
             let answer = json(self.post(replica, number).await, StatusCode::OK).await;
@@ -82,21 +82,21 @@ impl Pair {
         }
     }
 
-    /// The frame `file` under this number.
+    /// Posts frame `file` of the clip under this number.
     pub async fn post_as(&self, replica: usize, number: usize, file: usize) -> Response {
         let url = self.url(replica, &format!("/frames?frame={number}"));
         let request = self.client.post(url).body(self.clip.frames[file].clone());
         request.send().await.unwrap()
     }
 
-    /// A frame without a number.
+    /// Posts a frame without a number.
     pub async fn post_unnumbered(&self, replica: usize) -> Response {
         let request = self.client.post(self.url(replica, "/frames"));
         let request = request.body(self.clip.frames[1].clone());
         request.send().await.unwrap()
     }
 
-    /// The session as a replica tells it.
+    /// The session, by `GET` from a replica.
     pub async fn view(&self, replica: usize) -> Response {
         self.client.get(self.url(replica, "")).send().await.unwrap()
     }

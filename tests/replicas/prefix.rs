@@ -1,4 +1,4 @@
-//! The configurations of docker/ before replicas that are below a path of a shared host.
+//! The configurations of docker/ with replicas below a path of a shared host (`--base-path`).
 
 use crate::balancers::{Balancer, haproxy, nginx};
 use crate::clip::Clip;
@@ -11,7 +11,7 @@ use uuid::Uuid;
 const BASE: &str = "/video/tracker";
 const FRAMES: usize = 6;
 
-/// Sessions that only their own replica knows are tracked behind this balancer.
+/// Without a store, tracks sessions behind this balancer, which must send each to its own replica.
 async fn sessions_stay_at_their_replicas(
     balance: fn(&[SocketAddr]) -> Balancer,
     client_makes_ids: bool,

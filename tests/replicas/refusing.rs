@@ -1,4 +1,4 @@
-//! A store that is there, but takes no writes, or is slow.
+//! A store that is reachable, but refuses writes, or is slow.
 
 use crate::pair::{Pair, json};
 use reqwest::{Response, StatusCode};
@@ -10,7 +10,7 @@ async fn must_come_again(answer: Response) {
     assert_eq!(problem["type"], "/docs/problems#store-unavailable");
 }
 
-/// The value of a metric of the first replica; none if it has no such metric.
+/// The value of a metric of the first replica; `None` if it does not have the metric.
 async fn metric(pair: &Pair, name: &str) -> Option<f64> {
     let page = pair.client.get(pair.replicas[0].url("/metrics")).send();
     let text = page.await.unwrap().text().await.unwrap();
@@ -32,14 +32,14 @@ async fn a_store_that_does_not_allow_writes_is_not_ready() {
     pair.redis.ask(&allow("-hset"));
     must_come_again(pair.post(0, 2).await).await;
     while pair.replicas[0].readiness().await == StatusCode::OK {}
-    // It stays so, for more than two probes.
+    // The state lasts for more than two probes of the store.
     let found = Instant::now();
     while found.elapsed() < Duration::from_millis(700) {
         assert_ne!(pair.replicas[0].readiness().await, StatusCode::OK);
     }
     assert_eq!(metric(&pair, "bagtrack_store_up").await, Some(0.0));
     assert!(metric(&pair, "bagtrack_store_failures_total").await > Some(0.0));
-    // What needs no write is answered.
+    // Requests that need no write are answered.
     assert_eq!(json(pair.view(0).await, StatusCode::OK).await["frames"], 2);
     must_come_again(pair.post(0, 2).await).await;
     pair.redis.ask(&allow("+hset"));
@@ -76,7 +76,7 @@ async fn a_store_that_gives_no_answer_is_waited_for_once() {
         must_come_again(pair.post(0, 4).await).await;
     }
     let others = asked.elapsed();
-    // The rest is tracking, and a busy machine.
+    // Besides the patience: time for tracking, and for a busy machine.
     assert!(first < 2 * PATIENCE, "{first:?}");
     assert!(others < PATIENCE, "{others:?}");
     pair.redis.go_on();
@@ -98,7 +98,7 @@ async fn a_frame_that_is_taken_renews_the_time_to_live_and_a_refused_one_does_no
         json(pair.post(0, number).await, StatusCode::OK).await;
         assert!(lives() > 50_000, "{}", lives());
         pair.redis.ask(&["pexpire", &key, "20000"]);
-        // Sent again, to a replica that has not answered it.
+        // Sends the frame again, to the replica that has not answered it.
         json(pair.post(1, number).await, StatusCode::OK).await;
         assert!(lives() > 50_000, "{}", lives());
         pair.redis.ask(&["pexpire", &key, "20000"]);

@@ -34,7 +34,7 @@ async fn sessions_that_left_memory_count_in_the_store_for_all_replicas() {
         (paths.len(), refused.status()),
         (6, StatusCode::TOO_MANY_REQUESTS)
     );
-    // Which of the two is used up, it does not say: the store tells neither.
+    // The text names both limits, since the store does not tell which one is reached.
     let problem: serde_json::Value = refused.json().await.unwrap();
     let detail = problem["detail"].as_str().unwrap();
     assert!(
@@ -43,14 +43,14 @@ async fn sessions_that_left_memory_count_in_the_store_for_all_replicas() {
     );
     let other = open(&client, &replicas[0], "203.0.113.1").await;
     assert_eq!(other.status(), StatusCode::CREATED);
-    // What has ended gives its place back.
+    // An ended session frees its place.
     let ended = client
         .delete(replicas[1].url(&paths[0]))
         .send()
         .await
         .unwrap();
     assert_eq!(ended.status(), StatusCode::NO_CONTENT);
-    // The replica that has refused looks again after a second.
+    // The replica that has refused asks the store again after a second.
     let again = async {
         loop {
             let answer = open(&client, &replicas[0], "198.51.100.1").await;
@@ -63,7 +63,7 @@ async fn sessions_that_left_memory_count_in_the_store_for_all_replicas() {
     assert_eq!(again.status(), StatusCode::CREATED);
 }
 
-/// What `/readyz` says with status 200.
+/// The text of `/readyz`, which must have status 200.
 async fn readiness(client: &Client, replica: &Replica) -> String {
     let answer = client.get(replica.url("/readyz")).send().await.unwrap();
     assert_eq!(answer.status(), StatusCode::OK);
@@ -79,14 +79,14 @@ async fn a_store_that_is_nearly_full_takes_frames_and_no_new_session() {
     let client = Client::new();
     let opened = open(&client, &replica, "198.51.100.1").await;
     let path = opened.headers()["location"].to_str().unwrap().to_owned();
-    // Others have 4 MiB of it, so that what is left below is not a matter of a few buffers.
+    // Other data takes 4 MiB, so that the free memory below is large compared with Redis's buffers.
     redis.ask(&["setrange", "others", "4194303", "x"]);
     let memory = redis.ask(&["info", "memory"]);
     let used = memory
         .lines()
         .find_map(|line| line.strip_prefix("used_memory:"));
     let used: u64 = used.unwrap().trim().parse().unwrap();
-    // Some 6 % of it are left, which many frames fit in.
+    // About 6 % of the memory is left, enough for many frames.
     redis.ask(&[
         "config",
         "set",
@@ -109,7 +109,7 @@ async fn a_store_that_is_nearly_full_takes_frames_and_no_new_session() {
             .unwrap()
             .contains("bagtrack_store_full 1")
     );
-    // All replicas share the store: were it 503, the balancer would send the frames nowhere.
+    // Status 200, because all replicas share the store: with 503, the balancer would have no replica left.
     assert_eq!(readiness(&client, &replica).await, "store-full");
     redis.ask(&["config", "set", "maxmemory", "0"]);
     let opened = open(&client, &replica, "198.51.100.1").await;

@@ -1,4 +1,4 @@
-//! What replicas do with one session between them, while nothing fails.
+//! Replicas that share one session while nothing fails.
 
 use crate::clip::Clip;
 use crate::pair::{Pair, json};
@@ -101,7 +101,7 @@ async fn sessions_belong_to_their_keys_at_every_replica_and_expire_everywhere() 
         let request = client.get(second.url(&format!("/sessions/{id}")));
         request.bearer_auth(key).send().await.unwrap()
     };
-    // On a busy machine one may have expired before it is looked at.
+    // On a busy machine, a session may expire before it is read: try again.
     let seen = async {
         loop {
             let id = open().await;
@@ -115,7 +115,7 @@ async fn sessions_belong_to_their_keys_at_every_replica_and_expire_everywhere() 
     let gone = async {
         loop {
             match view(id, "0123456789abcdef").await.status() {
-                // A fast machine asks more often than a client may.
+                // A fast machine may exceed the rate limit.
                 StatusCode::OK | StatusCode::TOO_MANY_REQUESTS => {}
                 other => break other,
             }

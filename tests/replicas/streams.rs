@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::time::Duration;
 use tokio::time::timeout;
 
-/// The replica to which a stream went that a newer one replaced.
+/// The close code of a stream that a newer stream of the session has replaced.
 const REPLACED: u16 = 4409;
 
 fn answer_of(message: &Value) -> Value {
@@ -30,7 +30,7 @@ async fn a_stream_goes_on_at_another_replica_and_the_old_one_tracks_nothing_more
         assert_eq!(answer["checkpoint"], number, "{answer}");
         assert_eq!(answer_of(&answer), expected[number - 1]);
     }
-    // A client whose line broke before it had the answers to frames 3 to 5.
+    // As a client does whose connection broke before it had the answers to frames 3 to 5.
     let mut new = StreamClient::open_in_time(pair.replicas[1].address, pair.id, "?from=3").await;
     assert_eq!(new.next, 6);
     for number in 3..6 {
@@ -39,14 +39,14 @@ async fn a_stream_goes_on_at_another_replica_and_the_old_one_tracks_nothing_more
         assert_eq!(answer["checkpoint"], 5);
         assert_eq!(answer_of(&answer), expected[number - 1]);
     }
-    // What comes over the old line is not tracked.
+    // Frames over the old stream are not tracked.
     old.send(&frames[6]).await;
     assert_eq!(old.receive().await, Received::Closed(REPLACED));
     for number in 6..12 {
         let answer = new.track(&frames[number]).await;
         assert_eq!(answer_of(&answer), expected[number - 1]);
     }
-    // Posts and a third stream go on from there.
+    // Posts and a third stream continue from the new stream's last frame.
     let posted = json(pair.post(0, 12).await, StatusCode::OK).await;
     assert_eq!(posted, expected[11]);
     let answer = new.track(&frames[13]).await;
@@ -68,7 +68,7 @@ async fn a_stream_goes_on_that_is_pinged_while_the_store_takes_its_frame() {
     let address = pair.replicas[0].address;
     let mut stream = StreamClient::open_in_time(address, pair.id, "").await;
     for number in 1..6 {
-        // What comes to the store meanwhile is done in order: the frame first, then what a ping asks.
+        // The paused store queues requests in order: first the frame's, then the ping's.
         pair.redis.pause();
         stream.send(&pair.clip.frames[number]).await;
         let early = timeout(Duration::from_millis(300), stream.receive()).await;
@@ -111,7 +111,7 @@ async fn a_stream_that_says_nothing_ends_with_its_session_and_with_a_newer_strea
     };
     let mut old = open(0).await;
     let mut new = open(1).await;
-    // Both answer pings meanwhile.
+    // Receives on both streams, so that both answer pings.
     tokio::select! {
         end = old.receive() => assert_eq!(end, Received::Closed(REPLACED)),
         end = new.receive() => panic!("{end:?}"),

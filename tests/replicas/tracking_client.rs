@@ -1,4 +1,4 @@
-//! A client that follows a clip with the Rust client: it numbers its frames, and sends again what got no answer.
+//! Tracks a clip with the Rust client, which numbers frames, and sends those without an answer again.
 
 use crate::clip::Clip;
 use bagtrack_client::{Client, OpenOptions, Rect, Session};
@@ -9,7 +9,7 @@ use uuid::Uuid;
 /// The answer to a frame, as the service wrote it.
 pub type Answer = Value;
 
-/// A track: its session, and the frames that were answered.
+/// A session that tracks a clip, with the answers so far.
 pub struct Track {
     session: Session,
     /// The session's id when it was opened.
@@ -20,7 +20,7 @@ pub struct Track {
 }
 
 impl Track {
-    /// Opens a session at `base`: the address of the service, or of what stands before it.
+    /// Opens a session at `base`: the address of the service, or of a balancer or proxy before it.
     pub async fn open(base: String, http: reqwest::Client, number: usize, clip: Clip) -> Self {
         let client = Client::builder(base).http(http);
         let client = client.timeout(Duration::from_secs(10));
@@ -47,7 +47,7 @@ impl Track {
         }
     }
 
-    /// Sends the next frame. False when there is none left.
+    /// Sends the next frame. False if none is left.
     pub async fn advance(&mut self) -> bool {
         let number = self.answers.len() + 1;
         let Some(frame) = self.clip.frames.get(number) else {
@@ -65,7 +65,7 @@ impl Track {
         self.id
     }
 
-    /// How many frames the service had answered, and asked for again.
+    /// How many answered frames the service has asked for again.
     pub fn resent(&self) -> u64 {
         self.session.resent()
     }
@@ -80,14 +80,14 @@ impl Track {
         self.session.resent() > 0 || self.was_lost()
     }
 
-    /// The whole session as bytes: two are the same exactly if all boxes that follow are.
+    /// A snapshot of the session. Equal snapshots mean that all later boxes are equal, too.
     pub async fn snapshot(&mut self) -> Vec<u8> {
         let snapshot = self.session.snapshot().await;
         let snapshot = snapshot.unwrap_or_else(|error| panic!("session {}: {error}", self.id));
         snapshot.to_vec()
     }
 
-    /// The answers to all frames.
+    /// Sends all frames that are left, and returns the answers to all.
     pub async fn follow(mut self) -> Vec<Answer> {
         while self.advance().await {}
         self.answers

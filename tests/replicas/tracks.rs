@@ -1,4 +1,4 @@
-//! Clients that follow a clip each while something happens to the service.
+//! Clients that track a clip each while the test disturbs the service.
 
 use crate::clip::Clip;
 use crate::replica::Replica;
@@ -11,18 +11,19 @@ use std::time::Duration;
 use tokio::sync::watch;
 use tokio::task::JoinSet;
 
-/// With the same secret, snapshots of the same state are the same bytes.
+/// The snapshot secret of all services: with the same secret, snapshots of the same state are equal bytes.
 pub const SECRET: [&str; 2] = ["--snapshot-keys", "a secret of these tests"];
 
-/// What a client gets: the answers, which are rounded, and the state that they lead to, which is not.
+/// The result of a client: the answers, whose numbers are rounded, and the snapshot after the last one, with exact
+/// numbers.
 pub type Got = (Vec<Answer>, Vec<u8>);
 
-/// What each client gets without a store and without failures.
+/// The result of each client without a store and without failures.
 pub async fn undisturbed(clips: &[Clip]) -> Vec<Got> {
     undisturbed_by(&program("bagtrack"), clips).await
 }
 
-/// The same from another build of the program.
+/// Like [`undisturbed`], with another build of the program.
 pub async fn undisturbed_by(program: &Path, clips: &[Clip]) -> Vec<Got> {
     let alone = Replica::start_program(program, &[], &SECRET);
     let mut all = Vec::new();
@@ -35,13 +36,13 @@ pub async fn undisturbed_by(program: &Path, clips: &[Clip]) -> Vec<Got> {
     all
 }
 
-/// The tracks of clients that go on.
+/// Clients at work.
 pub struct Tracks {
     going: JoinSet<(usize, Track, Vec<u8>)>,
     ended: Vec<(usize, Track, Vec<u8>)>,
     /// How many frames each client may send.
     allowed: watch::Sender<usize>,
-    /// How many each has answers to.
+    /// How many frames of each client are answered.
     reached: watch::Receiver<Vec<usize>>,
 }
 
@@ -51,7 +52,7 @@ impl Tracks {
         Self::start_with(usize::MAX, base, clips, keeps_connections)
     }
 
-    /// The same with so many frames that each may send for now.
+    /// Like [`Self::start`], but each client stops after this number of frames until [`Self::allow`].
     pub fn start_with(allowed: usize, base: &str, clips: &[Clip], keeps_connections: bool) -> Self {
         let (allowed, allows) = watch::channel(allowed);
         let (tell, reached) = watch::channel(vec![0; clips.len()]);
@@ -83,24 +84,24 @@ impl Tracks {
         }
     }
 
-    /// Each client may have sent so many frames.
+    /// Lets each client send up to this number of frames in all.
     pub fn allow(&self, frames: usize) {
         self.allowed.send_replace(frames);
     }
 
-    /// Waits until each client has so many answers.
+    /// Waits until each client has this number of answers.
     pub async fn reach(&mut self, frames: usize) {
         self.wait_for(|reached| reached.iter().all(|count| *count >= frames))
             .await;
     }
 
-    /// Waits until they have so many together.
+    /// Waits until all clients together have this number of answers.
     pub async fn reach_together(&mut self, frames: usize) {
         self.wait_for(|reached| reached.iter().sum::<usize>() >= frames)
             .await;
     }
 
-    /// Until a client has failed, too.
+    /// Waits for a condition on the numbers of answers; fails if a client fails.
     async fn wait_for(&mut self, is_reached: impl Fn(&[usize]) -> bool) {
         loop {
             tokio::select! {
@@ -115,7 +116,7 @@ impl Tracks {
         }
     }
 
-    /// Waits for the end of all; gives the tracks, and the states that they lead to, in the order of the clips.
+    /// Waits for all clients to end. Returns the tracks and the last snapshots, in the order of the clips.
     pub async fn end(mut self) -> Vec<(Track, Vec<u8>)> {
         while let Some(track) = self.going.join_next().await {
             self.ended.push(track.expect("a track was lost"));
@@ -126,7 +127,8 @@ impl Tracks {
         ended.map(|(_, track, state)| (track, state)).collect()
     }
 
-    /// Waits for the end of all. No track and no answered frame is lost, and all get this.
+    /// Waits for all clients to end, and checks that no track and no answered frame is lost, and that the results are
+    /// these.
     pub async fn end_as(self, expected: &[Got]) {
         let ended = self.end().await;
         for (number, ((track, state), expected)) in ended.iter().zip(expected).enumerate() {
@@ -139,7 +141,7 @@ impl Tracks {
     }
 }
 
-/// Whether a client has got what it should.
+/// Checks the result of a client.
 pub fn check(number: usize, (track, state): (&Track, &[u8]), (answers, last): &Got) {
     assert_eq!(track.answers.len(), answers.len(), "client {number}");
     for (answer, expected) in track.answers.iter().zip(answers) {

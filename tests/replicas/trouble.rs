@@ -1,4 +1,4 @@
-//! The configurations of docker/ before replicas that are about to end, or whose store is away; and streams.
+//! The configurations of docker/ with replicas that are about to end, or whose store is out of reach; and streams.
 
 use crate::balancers::{Balancer, haproxy, nginx};
 use crate::clip::Clip;
@@ -20,7 +20,7 @@ fn location(opened: &Response) -> String {
     location.to_str().unwrap().to_owned()
 }
 
-/// Without a store: what goes to another replica would not find its session.
+/// Without a store, a request that went to another replica would not find its session.
 #[tokio::test]
 #[ignore = "needs haproxy"]
 async fn haproxy_sends_a_replica_that_is_about_to_end_the_frames_of_its_sessions_and_no_new_ones() {
@@ -38,8 +38,8 @@ async fn haproxy_sends_a_replica_that_is_about_to_end_the_frames_of_its_sessions
     let own = own.expect("a replica has the session");
     own.ask_to_end();
     while own.readiness().await == StatusCode::OK {}
-    // HAProxy has found out when the others take so many sessions one after the other. Until then the replica refuses
-    // some.
+    // Until HAProxy has noticed that the replica drains, it sends it some new sessions, which are refused. It has when
+    // this number of sessions in a row are opened by the others.
     const ALL: usize = 16;
     let (asked, mut number, mut opened) = (Instant::now(), 0, 0);
     while opened < ALL {
@@ -56,7 +56,7 @@ async fn haproxy_sends_a_replica_that_is_about_to_end_the_frames_of_its_sessions
             _ => 0,
         };
     }
-    // Longer than HAProxy would need to take it for dead.
+    // Longer than HAProxy would need to consider the replica dead.
     while asked.elapsed().as_secs() < 5 {
         number += 1;
         let frame = clip.frames[number % 60].clone();
@@ -92,7 +92,7 @@ async fn behind_haproxy_a_store_that_is_away_is_told_by_problem_documents() {
     let stopped = Instant::now();
     loop {
         assert!(is_problem(post(2).await, "store-unavailable").await);
-        // A replica's own answer, until HAProxy has found out that no replica wants new sessions.
+        // The answer of a replica, until HAProxy has noticed that no replica accepts new sessions.
         let new = open(&pair.client, &front, &pair.clip).await;
         if is_problem(new, "not-ready").await {
             break;
@@ -102,7 +102,7 @@ async fn behind_haproxy_a_store_that_is_away_is_told_by_problem_documents() {
             "HAProxy does not find out"
         );
     }
-    // Longer than HAProxy would need to take the replicas for dead.
+    // Longer than HAProxy would need to consider the replicas dead.
     let told = Instant::now();
     while told.elapsed().as_secs() < 4 {
         assert!(is_problem(post(2).await, "store-unavailable").await);
@@ -112,7 +112,7 @@ async fn behind_haproxy_a_store_that_is_away_is_told_by_problem_documents() {
     while open(&pair.client, &front, &pair.clip).await.status() != StatusCode::CREATED {}
 }
 
-/// A stream through a balancer, and its frames again through another stream.
+/// Tracks frames over a stream through a balancer, and goes on over a second stream, beginning with a stored answer.
 async fn a_stream_passes(balance: fn(&[std::net::SocketAddr]) -> Balancer) {
     let pair = Pair::open(&[], 12).await;
     let expected = pair.undisturbed().await;

@@ -19,7 +19,7 @@ use serde_json::Value;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
-/// The program of the release before, and this one.
+/// The paths of the previous release's program and of the one under test.
 fn programs() -> [PathBuf; 2] {
     let previous =
         std::env::var_os("BAGTRACK_PREVIOUS").expect("BAGTRACK_PREVIOUS names a program");
@@ -31,7 +31,7 @@ fn programs() -> [PathBuf; 2] {
     programs
 }
 
-/// Frames that a process has answered.
+/// How many frames a replica has answered.
 async fn answered(replica: &Replica) -> u64 {
     let page = reqwest::get(replica.url("/metrics")).await.unwrap();
     let text = page.text().await.unwrap();
@@ -42,7 +42,7 @@ async fn answered(replica: &Replica) -> u64 {
     counts.sum()
 }
 
-/// How far two boxes overlap, of the area that they cover.
+/// Intersection over union of two boxes.
 fn overlap(answers: [&Answer; 2]) -> f64 {
     let [a, b] = answers.map(|answer| {
         let side = |name: &str| answer["box"][name].as_f64().unwrap();
@@ -56,10 +56,10 @@ fn overlap(answers: [&Answer; 2]) -> f64 {
     common / (a[2] * a[3] + b[2] * b[3] - common)
 }
 
-/// Replaces of replicas: which, and whether by the new program.
+/// Replacements of replicas: the index of the replica, and whether the new program replaces it.
 type Steps = [(usize, bool)];
 
-/// A rolling upgrade that is taken back in the middle, goes on to its end, and is taken back for one replica again.
+/// A rolling upgrade that is reverted in the middle, then completed, and finally reverted for one replica.
 const ROLL: [(usize, bool); 7] = [
     (0, true),
     (1, true),
@@ -70,8 +70,8 @@ const ROLL: [(usize, bool); 7] = [
     (1, true),
 ];
 
-/// The documented restart of a replica, with another program: it drains, ends with status 0, and the next one is
-/// waited for.
+/// Restarts a replica with another program, as documented: the old process drains and ends with status 0, and the new
+/// one must become ready.
 async fn replace(replica: &mut Replica, program: &Path) {
     tokio::task::block_in_place(|| {
         let status = replica.end();
@@ -82,8 +82,8 @@ async fn replace(replica: &mut Replica, program: &Path) {
     while replica.readiness().await != StatusCode::OK {}
 }
 
-/// Replaces replicas while clients go on in phases: in the first half of each all replicas run, in the second one of
-/// them is replaced. Gives how many frames each program has answered.
+/// Replaces replicas while clients go on. In the first half of each phase all replicas run, in the second half one is
+/// replaced. Returns how many frames each program has answered.
 async fn roll(
     (tracks, frames): (&mut Tracks, usize),
     (replicas, programs): (&mut [Replica], &[PathBuf; 2]),
@@ -109,7 +109,7 @@ async fn roll(
     counts
 }
 
-/// What clients got, against what each program alone gives.
+/// Compares the clients' results with those of each program alone.
 async fn compare(tracks: Tracks, programs: &[PathBuf; 2], clips: &[Clip], every: u64) {
     let frames = clips[0].frames.len() - 1;
     let [old, new] = [
@@ -128,7 +128,7 @@ async fn compare(tracks: Tracks, programs: &[PathBuf; 2], clips: &[Clip], every:
             check(number, (&track, &state), &new[number]);
             continue;
         }
-        // Trackers that differ make a track that is that of neither.
+        // If the trackers of the two programs differ, a mixed track equals neither: its boxes must be near one of them.
         for (at, answer) in track.answers.iter().enumerate() {
             let near = [&old, &new].map(|run| overlap([answer, &run[number].0[at]]));
             let near = near[0].max(near[1]);
