@@ -115,7 +115,7 @@ fn a_signal_before_the_first_row_ends_it_too() {
     assert!(!file.exists(), "a file without a row");
 }
 
-/// The rows go to a pipe that nobody reads, so the command is blocked in a write when the signal comes.
+/// The rows go to a pipe without a reader, which blocks the command, so that the first signal does not end it.
 #[test]
 fn a_second_signal_ends_it_at_once() {
     let parent = folder();

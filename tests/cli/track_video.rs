@@ -53,7 +53,7 @@ fn a_video_gets_the_boxes_of_its_frames_and_a_drawn_video_has_all_of_them() {
     assert!(pictures.join("000011.jpg").is_file());
 }
 
-/// The message must say that ffmpeg is missing, not "No such file or directory".
+/// The message must say what to do, not just "No such file or directory".
 #[test]
 fn standard_input_and_addresses_are_told_as_no_files() {
     for source in ["-", "http://127.0.0.1/clip.mp4"] {
@@ -277,7 +277,7 @@ fn a_video_has_the_same_colors_whatever_matrix_they_are_stored_with() {
     assert!(mean < 4.5, "{mean}");
 }
 
-/// It is made from pictures before, of which ffmpeg gave none: the file had "no pictures in it".
+/// The last frame depends on pictures before it, which must be decoded even though none of them is tracked.
 #[test]
 #[ignore = "needs ffmpeg"]
 fn a_trimmed_video_is_followed_from_its_last_frame_on() {
@@ -428,7 +428,7 @@ fn mp4_boxes(mut bytes: &[u8]) -> Vec<&[u8]> {
     boxes
 }
 
-/// The cover was taken for the video, which had one picture then; and the name was changed on its way to ffmpeg.
+/// The cover must not be taken for the video, and a name that is no UTF-8 must reach ffmpeg unchanged.
 #[test]
 #[ignore = "needs ffmpeg"]
 fn a_cover_before_the_tracks_is_no_track_and_a_name_may_be_no_text() {

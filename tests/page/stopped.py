@@ -157,7 +157,7 @@ def drawn_as_it_goes_on(checks):
         drag(page, sent_box(checks.files.truth[last]))
         page.locator("#cancel").wait_for()
         file()
-        # Long enough for the other source to open and go on, if it were not dropped.
+        # Long enough for the source to open, and for a run that did not wait for the cancelled work to go on.
         page.wait_for_timeout(1000)
         picture()
         to_the_end(page)

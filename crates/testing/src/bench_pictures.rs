@@ -1,4 +1,4 @@
-//! The frames that are sent: the benchmarks' scene in colour, as JPEG.
+//! The frames that the load generator sends: the benchmarks' scene in colour, as JPEG.
 
 use crate::bench_scene as scene;
 use bagtrack_tracker::Rect;
@@ -6,7 +6,7 @@ use jpeg_encoder::{ColorType, Encoder, EncodingError, SamplingFactor};
 
 pub use scene::{HEIGHT, WIDTH};
 
-/// JPEGs of one round of the scene, 4:2:0, quality 85.
+/// JPEGs (4:2:0, quality 85) of one round of the scene, with each pixel `zoom` x `zoom` times.
 pub fn jpegs(zoom: usize) -> Result<Vec<Vec<u8>>, EncodingError> {
     let (width, height) = ((WIDTH * zoom) as u16, (HEIGHT * zoom) as u16);
     let jpeg = |t| {
@@ -24,7 +24,7 @@ pub fn jpegs(zoom: usize) -> Result<Vec<Vec<u8>>, EncodingError> {
     (0..scene::ROUND).map(jpeg).collect()
 }
 
-/// The box in the first of them.
+/// The target's box in the first frame, in pixels.
 pub fn target(zoom: usize) -> Rect {
     scene::target(0).scaled(zoom as f64, zoom as f64)
 }

@@ -4,7 +4,7 @@ use bagtrack_tracker::{Frame, Params, Rect, Tracker};
 
 pub const WIDTH: usize = 320;
 pub const HEIGHT: usize = 240;
-/// Frames until the target is where it began.
+/// Frames until the target is at its first place again.
 pub const ROUND: usize = 64;
 
 fn texture(x: usize, y: usize, seed: u32) -> u8 {
@@ -15,7 +15,7 @@ fn texture(x: usize, y: usize, seed: u32) -> u8 {
     (hash / 2 + (x * 3 + y * 2) as u32 % 120) as u8
 }
 
-/// Where the target of 60 x 48 pixels is in frame `t`.
+/// The upper left corner of the target, which has 60 x 48 pixels, in frame `t`.
 fn place(t: usize) -> (usize, usize) {
     let angle = t as f64 / ROUND as f64 * std::f64::consts::TAU;
     let (sine, cosine) = angle.sin_cos();
@@ -25,7 +25,7 @@ fn place(t: usize) -> (usize, usize) {
     )
 }
 
-/// The gray values of frame `t`, each pixel `zoom` x `zoom` times.
+/// The gray values of frame `t`, row by row, with each pixel `zoom` x `zoom` times.
 pub fn luma(t: usize, zoom: usize) -> Vec<u8> {
     let (left, top) = place(t);
     let pixel = |x: usize, y: usize| {

@@ -1,9 +1,9 @@
-//! Runs the real programs, in folders that go away.
+//! Runs the programs of the workspace, in temporary folders.
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
-/// A folder that goes away with the test.
+/// A temporary folder, deleted when the value is dropped.
 pub fn folder() -> TempDir {
     tempfile::tempdir().expect("the system has a place for temporary folders")
 }
@@ -11,7 +11,7 @@ pub fn folder() -> TempDir {
 /// The path of a program of this workspace, which cargo builds beside the test that asks for it.
 pub fn program(name: &str) -> PathBuf {
     let test = std::env::current_exe().expect("a running program has a path");
-    // A test is in `deps`, an example in `examples`; programs are in the folder above.
+    // Tests are built in `deps`, examples in `examples`; programs in the folder above.
     let folder = test.parent().and_then(Path::parent);
     let folder = folder.expect("cargo puts tests into a folder of its own");
     folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
@@ -23,7 +23,7 @@ pub fn run(name: &str, args: &[&str]) -> Output {
     output.unwrap_or_else(|error| panic!("{name}, which cargo builds: {error}"))
 }
 
-/// Standard output of a run that must succeed without a word on standard error.
+/// Standard output of a run, which must succeed with empty standard error.
 pub fn success(output: Output) -> String {
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{errors}");
@@ -87,7 +87,7 @@ pub fn text(path: &Path) -> &str {
     path.to_str().expect("temporary folders have plain names")
 }
 
-/// The boxes of a file in the OTB layout, as they are in it.
+/// The boxes of a file in the OTB layout, unchanged: x, y, width, height, in pixels from 1.
 pub fn boxes(lines: &str) -> Vec<[f64; 4]> {
     lines.lines().map(numbers).collect()
 }
@@ -143,7 +143,7 @@ pub fn video_of(clip: &Path, video: &Path, times: u32) {
     assert!(command.status().expect("ffmpeg starts").success());
 }
 
-/// What ffprobe tells of a video when it is asked so.
+/// The output of ffprobe for a video, with the options `asked`.
 pub fn probe(video: &Path, asked: &str) -> String {
     let mut command = Command::new("ffprobe");
     command.args(["-v", "error", "-of", "csv=p=0"]);
@@ -152,7 +152,7 @@ pub fn probe(video: &Path, asked: &str) -> String {
     told.trim().to_owned()
 }
 
-/// What ffprobe finds out about a video by decoding all of it: width, height, rate, number of frames.
+/// Width, height, rate and number of frames of a video, found by ffprobe, which decodes all of it.
 pub fn about(video: &Path) -> String {
     let entries = "stream=width,height,avg_frame_rate,nb_read_frames";
     probe(video, &format!("-count_frames -show_entries {entries}"))

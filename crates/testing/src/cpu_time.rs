@@ -3,17 +3,17 @@
 
 use rustix::time::{ClockId, Timespec, clock_gettime};
 
-/// What is timed.
+/// A piece of work to time.
 pub type Action<'a> = Box<dyn FnMut() + 'a>;
 
-/// Calls every one of `actions` `rounds` times, in turns; gives the median seconds of each.
+/// Calls each action `rounds` times, in turns. Returns the median time of each in seconds.
 pub fn medians(rounds: usize, actions: Vec<Action<'_>>) -> Vec<f64> {
     cycles(rounds, 1, actions)
 }
 
-/// The same for actions of which every `period`-th call has more to do: `rounds` times `period` calls, in turns; gives
-/// for each action the mean, over the calls of a period, of their medians. So rare work counts, and other work on the
-/// machine does not.
+/// Like [`medians`], for actions of which every `period`-th call has more to do: makes `rounds` times `period` calls of
+/// each. Returns for each action the median of each call of a period over the rounds, averaged over the period. So rare
+/// work counts, and other work on the machine does not.
 pub fn cycles(rounds: usize, period: usize, mut actions: Vec<Action<'_>>) -> Vec<f64> {
     let mut times = vec![vec![Vec::with_capacity(rounds); period]; actions.len()];
     for call in 0..rounds * period {
@@ -39,14 +39,14 @@ fn seconds() -> f64 {
     tv_sec as f64 + tv_nsec as f64 * 1e-9
 }
 
-/// Seconds of processor time that the threads of a process have used, in hundredths (Linux only).
+/// Seconds of processor time that the threads of a process have used, to a hundredth (Linux only).
 pub fn of_process(id: u32) -> f64 {
     let path = format!("/proc/{id}/stat");
     let stat = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
-    // The name of the program comes second, in brackets; user and system time are the 12th and 13th field behind it.
+    // The second field is the name of the program, in brackets; user and system time are the 12th and 13th after it.
     let (_, fields) = stat.rsplit_once(") ").expect("the name is in brackets");
     let ticks = fields.split(' ').skip(11).take(2);
     let ticks: u64 = ticks.filter_map(|field| field.parse::<u64>().ok()).sum();
-    // Linux tells them in hundredths of a second on every machine.
+    // Linux gives these times in hundredths of a second on every machine.
     ticks as f64 / 100.0
 }

@@ -1,4 +1,4 @@
-//! An issuer of JSON Web Tokens: its keys, its key set, and what it signs.
+//! An issuer of JSON Web Tokens: its keys, its key set, and its signatures.
 
 use base64::Engine;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
@@ -10,7 +10,7 @@ use ring::signature::{
 };
 use serde_json::{Value, json};
 
-/// A private key of RSA with 2,048 bits, for tests alone: ring makes none.
+/// An RSA private key of 2,048 bits, for tests only, since ring cannot make one.
 const RSA_KEY: &[u8] = include_bytes!("issuer_rsa.pk8");
 
 /// A private key of an issuer.
@@ -22,25 +22,25 @@ pub struct IssuerKey {
 
 #[derive(Debug)]
 enum Pair {
-    /// Its curve, and its algorithm.
+    /// The names of the curve and of the algorithm, and the key.
     Ecdsa(&'static str, &'static str, EcdsaKeyPair),
     Ed25519(Ed25519KeyPair),
-    /// Its algorithm.
+    /// The name of the algorithm, and the key.
     Rsa(&'static str, RsaKeyPair),
 }
 
 impl IssuerKey {
-    /// A key of the curve P-256, of this name.
+    /// A new key of the curve P-256, with this `kid`.
     pub fn p256(id: &'static str) -> Self {
         Self::ecdsa(id, ("P-256", "ES256"), &ECDSA_P256_SHA256_FIXED_SIGNING)
     }
 
-    /// One of the curve P-384.
+    /// A new key of the curve P-384, with this `kid`.
     pub fn p384(id: &'static str) -> Self {
         Self::ecdsa(id, ("P-384", "ES384"), &ECDSA_P384_SHA384_FIXED_SIGNING)
     }
 
-    /// One of Ed25519.
+    /// A new Ed25519 key, with this `kid`.
     pub fn ed25519(id: &'static str) -> Self {
         let document = Ed25519KeyPair::generate_pkcs8(&SystemRandom::new()).expect("randomness");
         let pair = Ed25519KeyPair::from_pkcs8(document.as_ref()).expect("a key that was made so");
@@ -50,7 +50,7 @@ impl IssuerKey {
         }
     }
 
-    /// One of RSA, which signs with the algorithm of this name, and may sign with others. All are the same key.
+    /// The RSA key, with this `kid`, which signs by this algorithm. It is the same key each time.
     pub fn rsa(id: &'static str, algorithm: &'static str) -> Self {
         let pair = RsaKeyPair::from_pkcs8(RSA_KEY).expect("a key of RSA");
         Self {
@@ -77,7 +77,7 @@ impl IssuerKey {
     pub fn public(&self) -> Value {
         match &self.pair {
             Pair::Ecdsa(curve, name, pair) => {
-                // The first byte says that both coordinates follow.
+                // The first byte marks an uncompressed point; both coordinates follow.
                 let point = &pair.public_key().as_ref()[1..];
                 let (x, y) = point.split_at(point.len() / 2);
                 json!({
@@ -106,7 +106,7 @@ impl IssuerKey {
         self.sign_as(&header, claims)
     }
 
-    /// The same with another header.
+    /// Signs claims under this header.
     pub fn sign_as(&self, header: &Value, claims: &Value) -> String {
         let signed = unsigned(header, claims);
         let signature = match &self.pair {
@@ -128,7 +128,7 @@ impl IssuerKey {
     }
 }
 
-/// How RSA signs under the name of an algorithm (RFC 7518, sections 3.3 and 3.5).
+/// The padding and hash of an RSA algorithm by its name (RFC 7518, sections 3.3 and 3.5).
 fn rsa_encoding(name: &str) -> &'static dyn RsaEncoding {
     match name {
         "RS256" => &signature::RSA_PKCS1_SHA256,
@@ -141,7 +141,7 @@ fn rsa_encoding(name: &str) -> &'static dyn RsaEncoding {
     }
 }
 
-/// What is signed of a token.
+/// The part of a token that is signed: header and claims, encoded.
 pub fn unsigned(header: &Value, claims: &Value) -> String {
     let encode = |value: &Value| URL_SAFE_NO_PAD.encode(value.to_string());
     format!("{}.{}", encode(header), encode(claims))

@@ -20,7 +20,7 @@ pub fn color(width: u32, height: u32) -> RgbImage {
     })
 }
 
-/// Rec. 601 in floating point: the oracle for the integer luma.
+/// The luma of Rec. 601 in floating point, 0 to 255, to check the integer version against.
 pub fn luma(rgb: [u8; 3]) -> f64 {
     0.299 * f64::from(rgb[0]) + 0.587 * f64::from(rgb[1]) + 0.114 * f64::from(rgb[2])
 }
@@ -40,13 +40,14 @@ pub fn encode(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
     bytes
 }
 
-/// A lossless WebP of 8192 x 4094 equal pixels: some kilobytes that take a worker tenths of a second, in one piece.
+/// A lossless WebP of 8192 x 4094 equal pixels: a few kilobytes, which take a worker tenths of a second to decode,
+/// without interruption.
 pub fn bomb() -> Vec<u8> {
     let picture = RgbImage::from_pixel(8192, 4094, image::Rgb([77; 3]));
     encode(&picture.into(), ImageFormat::WebP)
 }
 
-/// How a JPEG is written.
+/// The options of a JPEG file.
 #[derive(Debug, Clone, Copy)]
 pub struct JpegForm {
     pub sampling: SamplingFactor,
@@ -100,7 +101,7 @@ pub fn jpeg_of(
     bytes
 }
 
-/// A TIFF block, big endian, with one entry: the orientation.
+/// A TIFF block in big-endian order with one entry: the orientation, 1 to 8.
 pub fn exif(orientation: u8) -> Vec<u8> {
     let mut block = b"MM\0\x2A\0\0\0\x08\0\x01".to_vec();
     block.extend([0x01, 0x12, 0, 3, 0, 0, 0, 1, 0, orientation, 0, 0]);
@@ -123,7 +124,7 @@ pub fn jpeg_forms() -> Vec<(String, JpegForm)> {
     ] {
         for scans in [None, Some(2), Some(6)] {
             for restart in [None, Some(3)] {
-                // The encoder cannot have both.
+                // The encoder does not support optimized tables together with restart markers.
                 for optimized in [false, restart.is_none()] {
                     let form = JpegForm {
                         sampling,

@@ -1,4 +1,4 @@
-//! Frames drawn here: a textured target that moves over a textured ground.
+//! Drawn frames: a textured target that moves over a textured background.
 
 use crate::picture_files;
 use image::{DynamicImage, GrayImage, ImageFormat, Luma};
@@ -11,7 +11,7 @@ pub fn scene(t: u32) -> GrayImage {
     scene_at(20 + 2 * t, 15 + t)
 }
 
-/// The scene with the upper left corner of the target at this place.
+/// The scene with the upper left corner of the target at this pixel.
 pub fn scene_at(left: u32, top: u32) -> GrayImage {
     GrayImage::from_fn(WIDTH, HEIGHT, |x, y| {
         let (dx, dy) = (x.wrapping_sub(left), y.wrapping_sub(top));

@@ -1,4 +1,4 @@
-//! Other programs that the tests start: on free ports, with their files in a folder that goes with them.
+//! Other programs that tests start, on free ports, with their files in temporary folders.
 
 use rustix::process::{Pid, Signal, kill_process};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -11,7 +11,7 @@ pub fn free_port() -> u16 {
     listener.local_addr().expect("it is bound").port()
 }
 
-/// Waits until something listens.
+/// Waits until the process listens at this address.
 pub fn wait_for(address: SocketAddr, process: &mut Child) {
     while TcpStream::connect(address).is_err() {
         if let Some(status) = process.try_wait().expect("it was started") {
@@ -21,7 +21,7 @@ pub fn wait_for(address: SocketAddr, process: &mut Child) {
     }
 }
 
-/// A process that ends with the test.
+/// A process that is killed when this is dropped.
 pub struct Process(pub Child);
 
 impl Process {
@@ -49,7 +49,7 @@ impl Drop for Process {
     }
 }
 
-/// A Redis in this folder. It keeps nothing, unless these flags say so.
+/// A Redis in this folder. It writes nothing to disk, unless the flags say so.
 pub fn redis_server(folder: &Path, port: u16, flags: &[&str]) -> Process {
     let mut command = Command::new("redis-server");
     command.current_dir(folder).args(["--bind", "127.0.0.1"]);
@@ -59,7 +59,7 @@ pub fn redis_server(folder: &Path, port: u16, flags: &[&str]) -> Process {
     process
 }
 
-/// What the Redis at this port answers to a command.
+/// The answer of the Redis at this port to a command.
 pub fn ask_redis(port: u16, words: &[&str]) -> String {
     let mut command = Command::new("redis-cli");
     let output = command.args(["-p", &port.to_string()]).args(words).output();
@@ -68,7 +68,7 @@ pub fn ask_redis(port: u16, words: &[&str]) -> String {
     String::from_utf8(output.stdout).expect("redis-cli writes UTF-8")
 }
 
-/// A Redis with an append-only file, written before each answer.
+/// A Redis with an append-only file, which it syncs before each answer.
 pub struct Redis {
     process: Process,
     folder: TempDir,
@@ -108,7 +108,7 @@ impl Redis {
         self.process.kill();
     }
 
-    /// It is there, and answers nothing.
+    /// Stops the process: it accepts connections, but does not answer.
     pub fn pause(&self) {
         self.process.signal(Signal::STOP);
     }
@@ -117,7 +117,7 @@ impl Redis {
         self.process.signal(Signal::CONT);
     }
 
-    /// What it answers to a command.
+    /// The answer to a command.
     pub fn ask(&self, words: &[&str]) -> String {
         ask_redis(self.address.port(), words)
     }

@@ -8,13 +8,13 @@ fn texture(x: usize, y: usize, seed: u32) -> u8 {
     ((cell ^ seed).wrapping_mul(2_654_435_761) >> 24) as u8
 }
 
-/// Up and down between 0 and `top`, a step a frame.
+/// A position that moves to and fro between 0 and `top`, by one a frame.
 fn bounce(t: usize, top: usize) -> f64 {
     let phase = t % (2 * top);
     phase.min(2 * top - phase) as f64
 }
 
-/// The target's box in frame `t`: a pixel a frame along both axes.
+/// The target's box in frame `t`, which moves by one pixel a frame along both axes.
 pub fn target(t: usize) -> Rect {
     Rect::new(20.0 + bounce(t, 60), 18.0 + bounce(t, 40), 24.0, 20.0)
 }
@@ -38,7 +38,7 @@ pub fn frame(t: usize) -> Frame {
     Frame::from_luma(width as u32, height as u32, luma).expect("a frame of this size")
 }
 
-/// Waves of several lengths that never repeat in sight: a background that a camera can be told by.
+/// Waves of several lengths without a visible period: a background that shows the motion of the camera.
 fn hills(x: f64, y: f64) -> f64 {
     let waves = (x * 0.13).sin() + (x * 0.041).cos() + (y * 0.11).sin() + (y * 0.053).cos();
     60.0 + 14.0 * waves

@@ -1,4 +1,4 @@
-//! The service on a free port, driven by named methods.
+//! The service on a free port in this process, with a method for each kind of request.
 
 use crate::pictures;
 use bagtrack::http::{Application, Config};
@@ -13,12 +13,12 @@ use tokio::task::JoinHandle;
 /// The box of the target in `pictures::scene(0)`.
 pub const BOX: &str = "20,15,16,12";
 
-/// Lets tests name the client of a request in `X-Forwarded-For`.
+/// Trusts this machine as a proxy, so that tests can name the client of a request in `X-Forwarded-For`.
 pub fn behind_a_proxy(config: &mut Config) {
     config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
 }
 
-/// Bodies may take so many bytes, each and all together, and those of one client all of them.
+/// Limits the bytes of each body and of all bodies together; one client may use all of them.
 pub fn bound_bodies(config: &mut Config, each: usize, all: usize) {
     config.max_body_bytes = each;
     config.max_upload_bytes = all;
@@ -41,7 +41,7 @@ impl TestApplication {
         Self::start_with(|_| ()).await
     }
 
-    /// The same, with a session that is open.
+    /// Starts with the default settings, and opens a session. Returns its id, too.
     pub async fn with_session() -> (Self, String) {
         let app = Self::start().await;
         let id = app.open().await;
@@ -53,7 +53,7 @@ impl TestApplication {
         let mut config = Config {
             listen: "127.0.0.1:0".parse().unwrap(),
             workers: Some(2),
-            // A loaded machine refuses nothing.
+            // Long enough that a busy machine does not refuse requests.
             queue_delay: Duration::from_secs(10),
             body_timeout: Duration::from_secs(60),
             work_timeout: Duration::from_secs(60),
@@ -88,12 +88,12 @@ impl TestApplication {
         stop.send(()).unwrap();
     }
 
-    /// Waits for the end; gives whether all open requests ended in time.
+    /// Waits for the end of the service. Returns whether all open requests ended in time.
     pub async fn ended(self) -> bool {
         self.served.await.unwrap()
     }
 
-    /// Asks the service to end, and waits for that; gives the same.
+    /// Asks the service to end, and waits for it. Returns whether all open requests ended in time.
     pub async fn end(mut self) -> bool {
         self.shut_down();
         self.ended().await
@@ -122,26 +122,26 @@ impl TestApplication {
         request.body(frame).send().await.unwrap()
     }
 
-    /// Opens a session on the first drawn frame with these settings; gives the answer.
+    /// Opens a session on the first drawn frame with these settings. Returns the answer.
     pub async fn opened(&self, query: &[(&str, &str)]) -> Value {
         let response = self.create(pictures::png(0), query).await;
         expect(response, StatusCode::CREATED).await
     }
 
-    /// The same with the usual box and seed 7; gives its id.
+    /// Opens a session with [`BOX`] and seed 7. Returns its id.
     pub async fn open(&self) -> String {
         let created = self.opened(&[("box", BOX), ("seed", "7")]).await;
         created["id"].as_str().unwrap().to_owned()
     }
 
-    /// `POST /sessions` of the client at this address, which a proxy tells.
+    /// `POST /sessions` with this address of the client in `X-Forwarded-For`.
     pub async fn create_as(&self, client: &str) -> Response {
         let request = self.request(Method::POST, "/sessions", &[("box", BOX)]);
         let request = request.header("x-forwarded-for", client);
         request.body(pictures::png(0)).send().await.unwrap()
     }
 
-    /// `POST /sessions/{id}/frames`, without a body so far.
+    /// `POST /sessions/{id}/frames`, to which the caller adds a body.
     pub fn frames_request(&self, id: &str, query: &[(&str, &str)]) -> RequestBuilder {
         self.request(Method::POST, &format!("/sessions/{id}/frames"), query)
     }
@@ -151,7 +151,7 @@ impl TestApplication {
         request.body(frame).send().await.unwrap()
     }
 
-    /// Posts drawn frame `t`, which is taken; gives the answer.
+    /// Posts drawn frame `t`, which must be accepted. Returns the answer.
     pub async fn track(&self, id: &str, t: u32) -> Value {
         expect(self.post_frame(id, pictures::png(t)).await, StatusCode::OK).await
     }
@@ -185,7 +185,7 @@ impl TestApplication {
         request.send().await.unwrap()
     }
 
-    /// `POST /sessions/{id}/token`, which is granted; gives the answer.
+    /// `POST /sessions/{id}/token`, which must succeed. Returns the answer.
     pub async fn made_token(&self, id: &str, query: &[(&str, &str)]) -> Value {
         let request = self.request(Method::POST, &format!("/sessions/{id}/token"), query);
         expect(request.send().await.unwrap(), StatusCode::OK).await
@@ -202,7 +202,7 @@ impl TestApplication {
         self.get(&format!("/sessions/{id}/snapshot")).await
     }
 
-    /// The bytes of a session.
+    /// The bytes of a snapshot of a session.
     pub async fn snapshot(&self, id: &str) -> Vec<u8> {
         let response = self.snapshot_of(id).await;
         assert_eq!(response.status(), StatusCode::OK);
@@ -220,7 +220,7 @@ pub async fn expect(response: Response, status: StatusCode) -> Value {
     serde_json::from_str(&text).unwrap_or(Value::Null)
 }
 
-/// The detail of a response that must be this problem and say these texts.
+/// The `detail` of a response, which must be this problem and contain these texts.
 pub async fn expect_detail(response: Response, slug: &str, says: &[&str]) -> String {
     let problem = expect_problem(response, slug).await;
     let detail = problem["detail"].as_str().unwrap().to_owned();

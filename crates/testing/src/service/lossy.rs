@@ -17,7 +17,7 @@ pub struct Lossy {
 }
 
 impl Lossy {
-    /// Before these servers, which get connections in turns.
+    /// A proxy before these servers, which get connections in turns. Each is cut after a random number of `bytes`.
     pub async fn before(servers: Vec<SocketAddr>, bytes: Range<usize>) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
         let address = listener.local_addr().expect("it is bound");
@@ -51,7 +51,7 @@ impl Drop for Lossy {
     }
 }
 
-/// Passes on so many bytes of both directions together. Whether the connection was cut then.
+/// Passes on up to `bytes` bytes of both directions together. Returns whether it then cut the connection.
 async fn pass(client: TcpStream, server: SocketAddr, bytes: usize) -> bool {
     let Ok(server) = TcpStream::connect(server).await else {
         return false;
@@ -78,7 +78,7 @@ async fn copy(
         let before = left.load(Ordering::Relaxed);
         let passed = count.min(before);
         left.fetch_sub(passed, Ordering::Relaxed);
-        // A part of what came is passed on: the other side gets half a message.
+        // Passes on a part of the bytes, so that the other side gets an incomplete message.
         if to.write_all(&buffer[..passed]).await.is_err() || passed < count || passed == before {
             return;
         }

@@ -1,4 +1,4 @@
-//! `bagtrack serve` as a process, whose log tells its address.
+//! `bagtrack serve` as a process; its address is read from the log.
 
 use crate::command::program;
 use crate::processes::Process;
@@ -11,10 +11,10 @@ use std::process::{ChildStderr, Command, Stdio};
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 
-/// `bagtrack serve` on a free port; it ends with this value.
+/// `bagtrack serve` on a free port; the process is killed when this is dropped.
 ///
-/// A line of its log is read when somebody waits for it. The others stay in the pipe, as if nobody read it: then the
-/// service drops what has no room.
+/// Lines of the log are read only when a method waits for one. The others stay in the pipe; if it is full, the service
+/// drops lines.
 pub struct Program {
     process: Process,
     log: Log,
@@ -30,10 +30,10 @@ impl Program {
         Self::spawn(&mut command).unwrap_or_else(|error| panic!("{command:?}: {error}"))
     }
 
-    /// By a command that becomes the program, such as one of [`serve`].
+    /// Starts the program by a command such as that of [`serve`].
     ///
     /// # Errors
-    /// It is not there, or ends before it listens.
+    /// The program does not exist, or ends before it listens.
     pub fn spawn(command: &mut Command) -> io::Result<Self> {
         let command = command.stdout(Stdio::null()).stderr(Stdio::piped());
         let mut process = Process(command.spawn()?);
@@ -45,7 +45,7 @@ impl Program {
             return Err(io::Error::other(ended));
         };
         let (_, url) = line.split_once(told).expect("the line has it");
-        // A line of JSON goes on behind it.
+        // In a log in JSON, a quotation mark follows the address.
         let url = url.split(['"', ' ']).next().expect("a first part");
         let (_, address) = url.split_once("://").expect("an address has a scheme");
         Ok(Self {
@@ -70,7 +70,7 @@ impl Program {
         self.process.signal(signal);
     }
 
-    /// The lines of its log that have been waited for, and those before them.
+    /// The lines of the log that were read so far.
     pub fn said(&self) -> &[String] {
         &self.said
     }
@@ -81,12 +81,12 @@ impl Program {
         line.unwrap_or_else(|| panic!("the log ends without {text}: {:?}", self.said))
     }
 
-    /// The rest of the log is read, and dropped.
+    /// Reads the rest of the log, and drops it.
     pub fn ignore_log(&mut self) {
         self.log.lines = None;
     }
 
-    /// Waits until it has ended; the exit status, and the rest of the log.
+    /// Waits until the process has ended. Returns the exit status, and the rest of the log.
     pub fn ends(mut self) -> (Option<i32>, Vec<String>) {
         let mut rest = Vec::new();
         while let Some(line) = self.log.next() {
@@ -105,7 +105,7 @@ pub fn serve(program: &Path) -> Command {
     command
 }
 
-/// The same for this workspace's program, after what a shell does before in the same process.
+/// The command that starts this workspace's program after these shell commands, such as `ulimit`, in the same process.
 pub fn serve_after(preparation: &str) -> Command {
     let mut command = Command::new("sh");
     command.args(["-c", &format!("{preparation}; exec \"$0\" \"$@\"")]);
@@ -114,7 +114,7 @@ pub fn serve_after(preparation: &str) -> Command {
     command
 }
 
-/// What whoever runs the tests has set is not for this command.
+/// Removes the settings of the program from the command's environment, which the user may have set.
 pub fn without_settings(command: &mut Command) {
     for (name, _) in std::env::vars_os() {
         if name
@@ -135,8 +135,8 @@ fn set_up(command: &mut Command) {
 
 /// The log of a process, read by a thread: a pipe has no time limit.
 struct Log {
-    /// None where it is ignored. A line is read when the one before it has been taken. Nobody waits for the lock, which
-    /// lets threads share a program.
+    /// `None` once the log is ignored. A line is read when the one before has been received. The lock only makes the
+    /// type shareable between threads.
     lines: Option<Mutex<Receiver<String>>>,
 }
 
@@ -145,7 +145,7 @@ impl Log {
         let (sender, lines) = sync_channel(0);
         std::thread::spawn(move || {
             for line in BufReader::new(pipe).lines() {
-                // Where nobody takes it, it is dropped.
+                // Sending fails once the log is ignored: the line is dropped.
                 let _ = sender.send(line.expect("the log is text"));
             }
         });
@@ -154,7 +154,7 @@ impl Log {
         }
     }
 
-    /// The next line; none at the end.
+    /// The next line; `None` at the end of the log.
     fn next(&mut self) -> Option<String> {
         let lines = self.lines.as_mut().expect("it is not ignored");
         let lines = lines.get_mut().expect("nobody has locked it");
@@ -165,7 +165,7 @@ impl Log {
         }
     }
 
-    /// The next line with this text; it and those before it are added to `said`.
+    /// The next line with this text. Adds that line and those before it to `said`.
     fn until(&mut self, text: &str, said: &mut Vec<String>) -> Option<String> {
         loop {
             let line = self.next()?;

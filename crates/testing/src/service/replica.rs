@@ -1,4 +1,4 @@
-//! `bagtrack serve` as a process, which can be killed and started again at its address.
+//! `bagtrack serve` as a process that can be killed and restarted at the same address.
 
 use crate::command::program;
 use crate::processes::{Process, free_port, wait_for};
@@ -25,7 +25,7 @@ impl Replica {
         Self::start_program(&program("bagtrack"), environment, flags)
     }
 
-    /// Another build of the program.
+    /// Starts another build of the program.
     pub fn start_program(program: &Path, environment: &[(&str, &str)], flags: &[&str]) -> Self {
         let address = SocketAddr::from(([127, 0, 0, 1], free_port()));
         let flags: Vec<String> = flags.iter().map(|flag| (*flag).to_owned()).collect();
@@ -67,7 +67,7 @@ impl Replica {
         if !has("--shutdown-delay") {
             command.args(["--shutdown-delay", "0s"]);
         }
-        // A store on a slow disk is waited for.
+        // A long timeout, for a store on a slow disk.
         if has("--store") && !has("--store-timeout") {
             command.args(["--store-timeout", "5s"]);
         }
@@ -81,7 +81,7 @@ impl Replica {
         format!("http://{}{path}", self.address)
     }
 
-    /// `kill -9`, and no start.
+    /// Kills the process by SIGKILL, without a restart.
     pub fn kill(&mut self) {
         self.process.kill();
     }
@@ -90,7 +90,7 @@ impl Replica {
         self.process.signal(Signal::TERM);
     }
 
-    /// Asks it to end, and waits until it has.
+    /// Asks the process to end, and waits until it has.
     pub fn end(&mut self) -> ExitStatus {
         self.ask_to_end();
         self.process.0.wait().expect("it was started")
@@ -101,7 +101,7 @@ impl Replica {
         self.process = Self::process(&self.program, environment, flags, self.address);
     }
 
-    /// Another build of the program, from the next start on.
+    /// Uses another build of the program from the next start on.
     pub fn change_program(&mut self, program: &Path) {
         self.program = program.to_owned();
     }

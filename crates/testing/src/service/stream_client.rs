@@ -16,11 +16,11 @@ use tokio_tungstenite::tungstenite::{Error, Message};
 
 pub struct StreamClient {
     socket: WebSocketStream<TcpStream>,
-    /// The number of the next frame, as the service told.
+    /// The number of the next frame, which the service sent at the opening.
     pub next: u64,
 }
 
-/// What comes from the service.
+/// A message from the service, or the close of the stream.
 #[derive(Debug, PartialEq)]
 pub enum Received {
     Message(Value),
@@ -59,7 +59,7 @@ impl StreamClient {
         opened.unwrap_or_else(|response| panic!("{response:?}"))
     }
 
-    /// Opens the stream as soon as the service has the time for it.
+    /// Opens the stream, and tries again while the service is too busy.
     pub async fn open_in_time(address: SocketAddr, id: impl Display, query: &str) -> Self {
         loop {
             match Self::try_open(address, &id, query, &[]).await {
@@ -75,7 +75,7 @@ impl StreamClient {
         self.socket.send(message).await.expect("the stream is open");
     }
 
-    /// The answer to a frame that is sent now.
+    /// Sends a frame, and returns its answer.
     pub async fn track(&mut self, frame: impl AsRef<[u8]>) -> Value {
         self.send(frame).await;
         self.message().await
@@ -89,14 +89,14 @@ impl StreamClient {
             .expect("the stream is open");
     }
 
-    /// Sends bytes past the client's own framing.
+    /// Sends raw bytes, without WebSocket framing.
     pub async fn send_raw(&mut self, bytes: &[u8]) {
         use tokio::io::AsyncWriteExt;
         let stream = self.socket.get_mut();
         stream.write_all(bytes).await.expect("the stream is open");
     }
 
-    /// What comes next; pings are answered on the way.
+    /// The next message or close. Answers pings meanwhile.
     pub async fn receive(&mut self) -> Received {
         loop {
             match within(self.socket.next(), "something comes").await {
@@ -119,7 +119,7 @@ impl StreamClient {
         }
     }
 
-    /// Waits for a ping, and does not answer it.
+    /// Reads without answering pings. Returns the bytes that came.
     pub async fn ignore_pings(self) -> Vec<u8> {
         use tokio::io::AsyncReadExt;
         let mut stream = self.socket.into_inner();
@@ -129,7 +129,7 @@ impl StreamClient {
         bytes
     }
 
-    /// The code that the stream is closed with.
+    /// The close code of the stream, which must be the next thing to come.
     pub async fn close_code(&mut self) -> u16 {
         match self.receive().await {
             Received::Closed(code) => code,
@@ -137,7 +137,7 @@ impl StreamClient {
         }
     }
 
-    /// Closes the stream as it should be done (RFC 6455, section 7.1.2): both sides say so before the line ends.
+    /// Closes the stream by the closing handshake (RFC 6455, section 7.1.2), before the connection ends.
     pub async fn close(mut self) {
         let normal = CloseFrame {
             code: CloseCode::Normal,
