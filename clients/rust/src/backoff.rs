@@ -1,4 +1,4 @@
-//! How long to wait before a request is sent again.
+//! The pauses before a request is sent again.
 
 use crate::network::Carrier;
 use std::time::Duration;
@@ -7,7 +7,7 @@ use tokio::time::Instant;
 const FIRST: Duration = Duration::from_millis(100);
 const LONGEST: Duration = Duration::from_secs(5);
 
-/// Pauses that grow, until the time is up.
+/// Growing pauses, until the time for retries is up.
 pub struct Backoff {
     begin: Instant,
     retry_for: Duration,
@@ -25,9 +25,10 @@ impl Backoff {
         }
     }
 
-    /// Waits, at least as long as the service asks for. False, and at once, where the time would be up then.
+    /// Waits, at least as long as the service asks for (`asked`). Returns false without waiting if the time would be up
+    /// by then.
     pub async fn wait(&mut self, asked: Option<Duration>) -> bool {
-        // Clients that were cut off together do not come back together.
+        // The pauses are random, so that clients that were cut off together do not come back together.
         let own = self.next.mul_f64(0.5 + self.carrier.fraction() / 2.0);
         let pause = own.max(asked.unwrap_or_default());
         self.next = (2 * self.next).min(LONGEST);
@@ -39,8 +40,8 @@ impl Backoff {
     }
 }
 
-/// The pauses between the recoveries of one call. The first recovery comes at once; where every replica loses the
-/// session again, they end with the time for retries.
+/// The pauses between the recoveries of one call. The first recovery comes at once. If every replica loses the session
+/// again, the recoveries end with the time for retries.
 pub struct RecoveryBackoff {
     backoff: Backoff,
     has_recovered: bool,
@@ -54,7 +55,7 @@ impl RecoveryBackoff {
         }
     }
 
-    /// Waits before the next recovery. False, and at once, where the time would be up then.
+    /// Waits before the next recovery. Returns false without waiting if the time would be up by then.
     pub async fn wait(&mut self) -> bool {
         let is_first = !std::mem::replace(&mut self.has_recovered, true);
         is_first || self.backoff.wait(None).await

@@ -1,4 +1,4 @@
-//! A service, where sessions are opened.
+//! The client: opens sessions at a service.
 
 use crate::error::ClientError;
 use crate::network::{Carrier, Network};
@@ -14,7 +14,7 @@ use reqwest::{IntoUrl, Url};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A bagtrack service. A copy shares the connections.
+/// A bagtrack service. Clones share the connections.
 #[derive(Debug, Clone)]
 pub struct Client {
     transport: Transport,
@@ -22,10 +22,10 @@ pub struct Client {
 }
 
 impl Client {
-    /// The service at this address, with its base path where it has one.
+    /// The service at this address (`http://host:port`, with the base path if it has one).
     ///
     /// # Errors
-    /// It is no address.
+    /// `url` cannot be parsed.
     pub fn new(url: impl IntoUrl) -> Result<Self, ClientError> {
         Self::builder(url).build()
     }
@@ -45,10 +45,10 @@ impl Client {
 
     /// Opens a session with its first frame (the bytes of a JPEG, PNG or WebP file) and the targets' boxes in it.
     ///
-    /// The client makes the session's id, so that asking twice opens one session.
+    /// The client makes the session's id, so that a request that is sent twice opens one session.
     ///
     /// # Errors
-    /// The service refuses the frame, a box or an option, or gives no answer.
+    /// The service refuses the frame, a box or an option, or does not answer.
     pub async fn open(
         &self,
         frame: impl Into<Bytes>,
@@ -59,10 +59,10 @@ impl Client {
         self.create(query, FRAME, frame.into()).await
     }
 
-    /// Opens a session that goes on where a snapshot was taken, here or at another service with the same keys.
+    /// Opens a session with the state of a snapshot, taken at this service or at one with the same snapshot keys.
     ///
     /// # Errors
-    /// The service refuses the snapshot, or gives no answer.
+    /// The service refuses the snapshot, or does not answer.
     pub async fn restore(&self, snapshot: impl Into<Bytes>) -> Result<Session, ClientError> {
         self.create(Query::new(), SNAPSHOT, snapshot.into()).await
     }
@@ -97,13 +97,13 @@ pub struct ClientBuilder {
     snapshot_every: u32,
 }
 
-/// A header with an API key, where that can be one. It is not shown.
+/// The authorization header for an API key, or why the key cannot be in a header. `Debug` does not show the key.
 type Key = Result<HeaderValue, ClientError>;
 
 impl ClientBuilder {
-    /// An API key, or a session token, which is sent with every request.
+    /// An API key or session token to send with every request. An empty one counts as none.
     pub fn api_key(mut self, key: &str) -> Self {
-        // Files with a key end with a line break.
+        // A key read from a file may end with a line break.
         let key = Some(key.trim()).filter(|key| !key.is_empty());
         let header = key.and_then(|key| HeaderValue::from_str(&format!("Bearer {key}")).ok());
         let header = header.map(|mut value| {
@@ -114,50 +114,50 @@ impl ClientBuilder {
         self
     }
 
-    /// Another address where a session may go on, when the one in use gives no answer or is about to end.
+    /// Another address, where a session goes on if the service at the one in use does not answer, or is about to end.
     pub fn or_at(mut self, url: impl IntoUrl) -> Self {
         self.addresses.push(url.into_url());
         self
     }
 
-    /// The longest time for one request (15 s); a millisecond more for 50 bytes of its frames, which take long over a
-    /// slow line.
+    /// The longest time for one request (default: 15 s). Each 50 bytes of frames add a millisecond, for slow
+    /// connections.
     pub fn timeout(mut self, timeout: Duration) -> Self {
         self.timeout = timeout;
         self
     }
 
-    /// For how long a request is sent again after a broken line, 408, 429, 502, 503 or 504 (60 s). With zero no request
-    /// is sent again; but a session that the service has lost is opened again, once.
+    /// For how long a request is sent again after a broken connection, 408, 429, 502, 503 or 504 (default: 60 s). With
+    /// zero no request is sent again; but a session that the service has lost is opened again, once.
     pub fn retry_for(mut self, time: Duration) -> Self {
         self.retry_for = time;
         self
     }
 
-    /// After so many frames a session takes a snapshot (30; more than 128 count as 128), and keeps the frames after it.
-    /// Zero: never, so that a session ends with the service, unless that drains first. A service with a store needs
-    /// none, and none are taken.
+    /// The number of frames from one snapshot of a session to the next (default: 30; at most 128). The client keeps the
+    /// frames since the last one. With zero it takes none, so a session ends with its service, unless that drains
+    /// first. From a service with a store it takes none either.
     pub fn snapshot_every(mut self, frames: u32) -> Self {
         self.snapshot_every = frames;
         self
     }
 
-    /// What requests are sent with: for proxies, certificates, or other numbers of connections.
+    /// The HTTP client to send requests with: for proxies, certificates, or other numbers of connections.
     pub fn http(mut self, http: reqwest::Client) -> Self {
         self.http = Some(http);
         self
     }
 
-    /// What carries requests in place of connections, in a simulation.
+    /// A simulated network, which carries requests instead of connections.
     pub fn network(mut self, network: Arc<dyn Network>) -> Self {
         self.network = Some(network);
         self
     }
 
-    /// The client.
+    /// Builds the client.
     ///
     /// # Errors
-    /// An address is none, or the API key cannot be one.
+    /// An address cannot be parsed, or the API key has characters that a header cannot have.
     pub fn build(self) -> Result<Client, ClientError> {
         let addresses: Result<Vec<Url>, _> = self.addresses.into_iter().collect();
         let http = self

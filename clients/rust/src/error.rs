@@ -1,4 +1,4 @@
-//! What can go wrong.
+//! The errors of the client.
 
 use bagtrack_api::ProblemDocument as Problem;
 use std::error::Error;
@@ -7,22 +7,24 @@ use std::error::Error;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ClientError {
-    /// The service refused the request; the session is as it was. Frames without an answer are forgotten.
+    /// The service refused the request, and the session is unchanged. The client drops the frames without an answer.
     #[error("the service refuses: {0}")]
     Refused(#[source] Box<Problem>),
-    /// For as long as is tried the service said to come again later. The frame is kept: the next call sends it.
+    /// During the whole time for retries, the service asked to try again later. The client keeps the frame, and the
+    /// next call sends it.
     #[error("the service is not available: {0}")]
     Unavailable(#[source] Box<Problem>),
-    /// For as long as is tried no whole answer came, and the frame is kept; or the request cannot be made at all.
+    /// During the whole time for retries, no complete answer came: the client keeps the frame, and the next call sends
+    /// it. Or the request cannot be made at all.
     #[error("no answer: {}", reason(.0))]
     Transport(#[from] reqwest::Error),
-    /// The service needs this frame again, which is not kept any more.
+    /// The service needs a frame again that the client does not keep any more.
     #[error("the service needs frame {frame} again, which is not kept any more")]
     NotKept {
         /// The number of the frame.
         frame: u64,
     },
-    /// The answer is none of a bagtrack service.
+    /// The answer is not that of a bagtrack service.
     #[error("the answer cannot be read: {0}")]
     Answer(#[from] serde_json::Error),
     /// An API key is empty, or has characters that a header cannot have.
@@ -30,7 +32,7 @@ pub enum ClientError {
     InvalidKey,
 }
 
-/// What an error stands on, the deepest last.
+/// The messages of the errors that caused this one, the innermost last.
 pub fn causes(error: &reqwest::Error) -> Vec<String> {
     let mut causes = Vec::new();
     let mut next = error.source();
@@ -41,12 +43,12 @@ pub fn causes(error: &reqwest::Error) -> Vec<String> {
     causes
 }
 
-/// The last cause and the address, where reqwest tells the address with its long query alone.
+/// The innermost cause and the address without its query, instead of reqwest's text, which has only the long address.
 fn reason(error: &reqwest::Error) -> String {
     let mut reason = causes(error).pop().unwrap_or_else(|| error.to_string());
     if let Some(mut url) = error.url().cloned() {
         url.set_query(None);
-        // These are not for a log. What has no host has none of them.
+        // No user name or password in logs. The calls fail only for an address without a host, which has neither.
         let _ = (url.set_username(""), url.set_password(None));
         reason += &format!(" ({url})");
     }

@@ -1,16 +1,16 @@
-//! What is kept of a session, so that it can be opened again.
+//! What the client keeps of a session, so that it can open it again: an origin, and the frames after it.
 
 use crate::upload::{Origin, Upload};
 use std::collections::BTreeMap;
 
-/// Most requests that are kept.
+/// Most requests with frames that are kept.
 pub const MOST: usize = 256;
 
-/// Where there is an origin, all frames after it are kept.
+/// An origin, and frames. If there is an origin, all frames after it are kept.
 #[derive(Debug, Default)]
 pub struct Kept {
     origin: Option<Origin>,
-    /// By the numbers of their first frames, without gaps.
+    /// By the number of the first frame of each, without gaps.
     uploads: BTreeMap<u64, Upload>,
 }
 
@@ -19,13 +19,13 @@ impl Kept {
         self.origin.as_ref()
     }
 
-    /// A newer origin; the frames up to there are not needed any more.
+    /// Takes a newer origin, and drops the frames up to it.
     pub fn renew(&mut self, origin: Origin) {
         self.forget_until(origin.frame);
         self.origin = Some(origin);
     }
 
-    /// Keeps the next frames. The oldest go where there are too many.
+    /// Keeps the next frames. Drops the oldest over [`MOST`], and with them the origin.
     pub fn put(&mut self, number: u64, upload: Upload) {
         self.uploads.insert(number, upload);
         while self.uploads.len() > MOST {
@@ -34,7 +34,7 @@ impl Kept {
         }
     }
 
-    /// The frames from this number on that were sent, or are to be sent, in one request.
+    /// The frames from this number on to the end of the request that has it.
     pub fn from(&self, number: u64) -> Option<Upload> {
         let (first, upload) = self.uploads.range(..=number).next_back()?;
         let before = usize::try_from(number - first).ok()?;
@@ -51,14 +51,14 @@ impl Kept {
         Some(upload.last(*first))
     }
 
-    /// Forgets the frames up to this one, which the service does not ask for again.
+    /// Drops the frames up to this one, which a newer origin or the service's store has.
     pub fn forget_until(&mut self, number: u64) {
         self.uploads
             .retain(|first, upload| upload.last(*first) > number);
         self.origin.take_if(|origin| origin.frame < number);
     }
 
-    /// Forgets the frames after this one, which the service has not taken.
+    /// Drops the frames after this one, which the service has refused.
     pub fn forget_after(&mut self, number: u64) {
         self.uploads.retain(|first, _| *first <= number);
     }
@@ -111,7 +111,7 @@ mod tests {
         kept.forget_until(3);
         assert_eq!(kept.from(1), None);
         assert_eq!(kept.from(4), Some(upload(&[4])));
-        // Frames 1 to 3 are not there, so the session could not be opened from its first frame.
+        // Frames 1 to 3 are dropped, so the first frame does not suffice to open the session again.
         assert_eq!(kept.origin(), None);
         kept.forget_after(4);
         assert_eq!((kept.from(5), kept.last()), (None, Some(4)));
