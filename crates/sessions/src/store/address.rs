@@ -8,14 +8,14 @@ use std::time::Duration;
 /// The text is no address of a store. It is not repeated, since it may hold a password.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AddressError {
-    /// It begins with `file:`, and names no folder.
+    /// The text begins with `file:`, and names no folder.
     #[error("file: is followed by a folder, like file:/var/lib/bagtrack")]
     NoFolder,
-    /// It is neither.
+    /// The text is neither a folder nor the address of a Redis.
     #[cfg(feature = "redis")]
     #[error(transparent)]
     Redis(#[from] RedisAddressError),
-    /// It is no folder, and there is nothing else here.
+    /// The text is no folder, and this build has no other stores.
     #[cfg(not(feature = "redis"))]
     #[error("this build, without the feature redis, has stores in folders only: file:DIR")]
     NoRedis,

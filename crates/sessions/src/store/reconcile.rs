@@ -5,12 +5,12 @@ use super::session_store::{Outcome, StoreUnavailable};
 use crate::planted::PlantedFault;
 use std::time::Duration;
 
-/// What the store was asked on behalf of.
+/// What the request that called the store wants of the session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Intent {
     /// To have the newest state: for a reader, a new stream, or frames whose order is known.
     Newest,
-    /// To take frames whose order nothing tells.
+    /// To track frames without numbers, whose order nothing tells.
     Unordered,
     /// To answer a frame that lies before the copy. `is_told` says that the store has told this copy.
     Past {
@@ -31,22 +31,22 @@ pub enum Gone {
 /// What a replica does next.
 #[derive(Debug)]
 pub enum Step {
-    /// What was found out with the copy stands. The record lives so long without a frame.
+    /// The result that was computed from the copy stands. The record lives for this time without a further frame.
     Commit(Duration),
     /// The copy becomes this record's state, and the request is looked at again.
     GoOn(Box<Record>),
-    /// The copy becomes this record's state, and the request is refused: another came first.
+    /// The copy becomes this record's state, and the request is refused: another replica's frame came first.
     Conflict(Box<Record>),
     /// Another session has the id now.
     Replaced(Box<Record>),
     /// The session is gone.
     Gone(Gone),
-    /// Nobody knows.
+    /// The store gave no answer or refused the call; nothing is known of the session.
     Unavailable(StoreUnavailable),
 }
 
-/// Reads the outcome of a call to the store, for a request that wants this of a copy of the session of this
-/// incarnation.
+/// Reads the outcome of a call to the store. `incarnation` is that of the copy's session, `intent` what the request
+/// wants of the copy.
 pub fn reconcile(
     incarnation: u64,
     intent: Intent,
@@ -60,7 +60,7 @@ pub fn reconcile(
         Ok(Outcome::Committed(ttl)) => return Step::Commit(ttl),
         Ok(Outcome::NotFound) => return Step::Gone(Gone::NoRecord),
         Ok(Outcome::Tombstoned) => return Step::Gone(Gone::Ended),
-        // Only a new session is refused so.
+        // Stores answer this only where a session is created.
         Ok(Outcome::Full) => return Step::Unavailable(StoreUnavailable("it is full".to_owned())),
         Ok(Outcome::Conflict(record)) => record,
     };

@@ -8,16 +8,16 @@ use serde::{Deserialize, Serialize};
 use std::time::Duration;
 use uuid::Uuid;
 
-/// The format of [`Record::head`]. Another one is not read; see [`UnreadableRecord`].
+/// The format of [`Record::head`]. A record of another format is refused with [`UnreadableRecord::Format`].
 const HEAD_FORMAT: u8 = 2;
 /// The greatest generation that is read: stores count it up as a signed number.
 const MAX_GENERATION: u64 = i64::MAX as u64 - 1;
-/// The last second of the year 9999, in seconds since 1970. Later moments cannot be told.
+/// The last second of the year 9999, in seconds since 1970. Later moments cannot be written as RFC 3339.
 const LAST_MOMENT: u64 = 253_402_300_799;
-/// No session lives longer without a frame: a hundred years, so that its end can be told.
+/// No session lives longer without a frame: a hundred years, so that the moment of its end can be written.
 pub(super) const MAX_TTL: Duration = Duration::from_secs(100 * 366 * 24 * 3600);
 
-/// Names a session. The id alone may be another session's later.
+/// Names a session. The id alone does not: after the session has ended, another one may be opened under it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct SessionName {
     /// Its id.
@@ -26,7 +26,8 @@ pub struct SessionName {
     pub incarnation: u64,
 }
 
-/// Which state of a record a replica has. The store in a folder writes it as it is.
+/// Which state of a record a replica has. The store in a folder writes this type as it is, so the fields are part of
+/// its format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Version {
     /// Goes up when a replica takes over a record whose last frames it does not have, or opens a stream.
@@ -38,8 +39,8 @@ pub struct Version {
 }
 
 impl Version {
-    /// A new record's, at this frame. No other record has had its generation: what was tracked from another one, also
-    /// of the same session, does not go on from this.
+    /// The version of a new record at this frame. Its generation is random, so that no copy of an earlier record, not
+    /// even of the same session, counts as this version.
     pub fn first(frame: u64) -> Self {
         Self {
             // Below 2⁶², so that it can be counted up as a signed number.
@@ -49,12 +50,12 @@ impl Version {
         }
     }
 
-    /// Whether a generation of a record can be counted up. That of a damaged one may be any.
+    /// Whether a generation can be counted up. A damaged record may hold any number.
     pub(super) fn is_generation(number: u64) -> bool {
         number <= MAX_GENERATION
     }
 
-    /// After the next generation has begun.
+    /// This version after the next generation has begun.
     pub fn fenced(self) -> Self {
         Self {
             generation: self.generation + 1,
@@ -62,7 +63,7 @@ impl Version {
         }
     }
 
-    /// After this frame was committed, with its state or without.
+    /// This version after a frame was committed, with its state or without.
     pub fn committed(self, frame: u64, with_state: bool) -> Self {
         Self {
             frame,
@@ -77,7 +78,7 @@ impl Version {
 pub struct Record {
     /// Which state this is.
     pub version: Version,
-    /// Whose the session is.
+    /// The client that owns the session.
     pub owner: Owner,
     /// How it was opened.
     pub opening: Opening,
@@ -97,15 +98,16 @@ struct Head {
 /// A record that this version of the program cannot read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum UnreadableRecord {
-    /// Another version wrote it: replicas of that version, which run meanwhile, can read it.
+    /// Another version of the program wrote the record. Replicas of that version, which may run during an upgrade, can
+    /// read it.
     #[error("the record has format {found}, and this service reads {read}")]
     Format {
-        /// That of the record.
+        /// The record's format.
         found: u8,
-        /// The one that this version reads.
+        /// The format that this version reads.
         read: u8,
     },
-    /// It is damaged.
+    /// The record is damaged.
     #[error("the record is damaged")]
     Damaged,
 }
@@ -163,7 +165,8 @@ impl Record {
     }
 }
 
-/// Whether a request that opens the session again can be answered: there are targets, and a moment at which it expires.
+/// Whether a request that opens the session again can be answered: the number of targets is possible, and the moment of
+/// expiry can be written.
 fn can_be_told(opening: &Opening) -> bool {
     let has_targets = match &opening.estimates {
         PerTarget::One(_) => true,
@@ -210,7 +213,7 @@ pub(crate) mod tests {
         };
         let head = written.head();
         assert_eq!(read(&head), Ok(written.clone()));
-        // Before records had a format they began with whether there is an owner.
+        // A head without the format begins with 1 where there is an owner.
         let format = |found| UnreadableRecord::Format {
             found,
             read: HEAD_FORMAT,
@@ -223,7 +226,7 @@ pub(crate) mod tests {
         assert_eq!(read(&[]), Err(UnreadableRecord::Damaged));
     }
 
-    /// Such a head was taken, and the request that opens the session again made the service panic.
+    /// If such a head were read, the request that opens the session again would panic.
     #[test]
     fn a_record_whose_opening_cannot_be_told_is_damaged() {
         let read = |generation, change: fn(&mut Record)| {
@@ -243,7 +246,7 @@ pub(crate) mod tests {
         assert_eq!(read(7, too_many), damaged);
         let never = |record: &mut Record| record.opening.expires = u64::MAX;
         assert_eq!(read(7, never), damaged);
-        // Nor can a generation be counted up that is the last one.
+        // The greatest generation cannot be counted up.
         assert_eq!(read(u64::MAX, |_| ()), damaged);
         let long = |record: &mut Record| record.ttl = Duration::from_millis(u64::MAX);
         assert_eq!(read(7, long), Ok(MAX_TTL));

@@ -1,4 +1,4 @@
-//! What a store of sessions does, whatever keeps them.
+//! The trait of all stores of sessions, with the types of its calls and answers.
 
 use super::record::{Record, SessionName, Version};
 use bytes::Bytes;
@@ -7,7 +7,8 @@ use std::fmt::Debug;
 use std::time::Duration;
 use uuid::Uuid;
 
-/// The store gave no answer in time. It may have done what it was asked for nevertheless.
+/// The store gave no answer in time, or could not do the call; the text is the reason. Without an answer the store may
+/// have done the call nevertheless.
 #[derive(Debug, Clone, Default, thiserror::Error)]
 #[error("the store gives no answer: {0}")]
 pub struct StoreUnavailable(pub String);
@@ -15,11 +16,13 @@ pub struct StoreUnavailable(pub String);
 /// What the store says to a call about a record.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
-    /// It was done, or the version is the newest. The record lives as long as this without a frame.
+    /// The call was done or, for a check, the version is the newest. The record lives for this time without a further
+    /// frame.
     Committed(Duration),
-    /// The record has another version, or is another session's; nothing was written.
+    /// The id has a record of another version, or of another session. The call was not done; this is that record at its
+    /// checkpoint.
     Conflict(Box<Record>),
-    /// There is no such record: its time to live is over, or the store has lost it.
+    /// The id has no record: its time to live is over, or the store has lost it.
     NotFound,
     /// The session was ended.
     Tombstoned,
@@ -36,9 +39,10 @@ pub struct Commit {
     pub before: Version,
     /// The number of the frame.
     pub frame: u64,
-    /// The state after it, where it is written.
+    /// The session's state after the frame; `None` where only the frame's number is committed.
     pub state: Option<Bytes>,
-    /// Whether this replica goes on from the record that a conflict tells.
+    /// Whether this replica, on a conflict, goes on from the record's checkpoint. Where frames came after the
+    /// checkpoint, the store then begins the record's next generation.
     pub takes_over: bool,
     /// How long the record lives from now without a frame.
     pub ttl: Duration,
@@ -47,7 +51,7 @@ pub struct Commit {
 /// What a client may have in the store, at all replicas together.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoreShare {
-    /// Names the client.
+    /// The client's name.
     pub client: String,
     /// Most places of sessions, one for each target.
     pub max_places: usize,
@@ -55,14 +59,14 @@ pub struct StoreShare {
     pub max_bytes: usize,
 }
 
-/// A session that is to be counted.
+/// A session that is to be counted against its client's [`StoreShare`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counted {
-    /// Which one.
+    /// The session.
     pub name: SessionName,
-    /// Its places.
+    /// Places that it takes, one for each target.
     pub places: usize,
-    /// Bytes that its state takes at most.
+    /// Most bytes that its state takes.
     pub bytes: usize,
     /// How long its record lives without a frame.
     pub ttl: Duration,
@@ -76,10 +80,11 @@ pub trait SessionStore: Debug + Send + Sync {
     /// Adds a record, unless there is one under this id or the session was ended.
     fn create<'a>(&'a self, id: Uuid, record: &'a Record) -> StoreFuture<'a, Outcome>;
 
-    /// Counts a session that is about to be created against what its client may have in the store. False where it may
-    /// not have it. A session counts as long as its record lives.
+    /// Counts a session, which is about to be created, against its client's share. False where the share has no room
+    /// for it. A session counts as long as its record lives.
     ///
-    /// A store that is as short-lived as its process and keeps nothing that left memory need not count.
+    /// The default counts nothing: that suffices for a store that ends with its process and has only sessions in
+    /// memory.
     fn admit<'a>(&'a self, share: &'a StoreShare, session: Counted) -> StoreFuture<'a, bool> {
         let _ = (share, session);
         Box::pin(async { Ok(true) })
@@ -88,11 +93,11 @@ pub trait SessionStore: Debug + Send + Sync {
     /// The record of this id at its checkpoint, if there is one.
     fn load(&self, id: Uuid) -> StoreFuture<'_, Option<Record>>;
 
-    /// Moves a record from one version to a frame.
+    /// Moves a record from the version before a frame to that frame.
     fn commit(&self, commit: Commit) -> StoreFuture<'_, Outcome>;
 
-    /// Asks whether this version is the newest. `takes_over` says that this replica goes on from the record that a
-    /// conflict tells; `renew` sets the record's time to live.
+    /// Asks whether this version is the newest. `takes_over` is that of [`Commit`]; `renew`, where given, becomes the
+    /// record's time to live.
     fn check(
         &self,
         name: SessionName,
@@ -111,7 +116,7 @@ pub trait SessionStore: Debug + Send + Sync {
     /// A random number that all who use the store have in common and clients do not know: `new`, if there is none yet.
     fn secret(&self, new: [u8; 32]) -> StoreFuture<'_, [u8; 32]>;
 
-    /// Whether the store answers and takes writes. One that is never away always does.
+    /// Whether the store answers and takes writes. The default is for stores that are never away.
     fn is_ready(&self) -> bool {
         true
     }
@@ -127,7 +132,7 @@ pub trait SessionStore: Debug + Send + Sync {
     }
 }
 
-/// A time as stores have it: in whole milliseconds, at least one.
+/// A time in whole milliseconds, at least one: the unit of the stores.
 pub(super) fn milliseconds(time: Duration) -> u64 {
     u64::try_from(time.as_millis()).unwrap_or(u64::MAX).max(1)
 }

@@ -22,7 +22,7 @@ use uuid::Uuid;
 /// The store. When it is dropped, what was written is synced, and the folder is free.
 #[derive(Debug)]
 pub struct FileStore {
-    /// None while it is dropped.
+    /// `None` only while the store is dropped: the thread ends once the sender is gone.
     calls: Option<Sender<Box<dyn Call>>>,
     thread: Option<JoinHandle<()>>,
     health: Arc<Health>,
@@ -58,7 +58,7 @@ impl FileStore {
         })
     }
 
-    /// Sends a rule to the thread, and waits for what comes of it.
+    /// Sends a rule to the thread, and waits for the result.
     fn call<'a, T: Send + 'static>(
         &'a self,
         rule: impl FnMut(&mut Transaction<'_>) -> Result<T, Fault> + Send + 'static,
@@ -91,7 +91,7 @@ impl Drop for FileStore {
     fn drop(&mut self) {
         self.calls = None;
         if let Some(thread) = self.thread.take() {
-            // One that panicked has logged it.
+            // A thread that panicked has logged its panic.
             let _ = thread.join();
         }
     }
@@ -174,8 +174,8 @@ mod tests {
 
     const LONG: Duration = Duration::from_secs(60);
 
-    /// A call that waited behind one that hung was written later, though its client had been told that it does not
-    /// count; and the store was called ready all the while.
+    /// A call waits behind one that hangs, and its client is told that it does not count. It must not be done later,
+    /// and the store must not be ready meanwhile.
     #[tokio::test(flavor = "multi_thread")]
     async fn a_call_that_was_told_to_have_no_answer_is_not_done_later() {
         let folder = tempfile::tempdir().unwrap();
@@ -192,7 +192,7 @@ mod tests {
         });
         let (id, written) = (Uuid::from_u128(1), record(7, 3));
         let late = async {
-            // The other one is at work, so this is of the next group.
+            // The hanging call is at work, so the next call is of the next group.
             tokio::task::block_in_place(|| begun.recv()).unwrap();
             store.create(id, &written).await
         };
@@ -200,7 +200,7 @@ mod tests {
         assert!(hangs.is_err() && late.is_err());
         assert!(!store.is_ready());
         release.send(()).unwrap();
-        // Without any call.
+        // The store gets ready without a further call.
         let ready = async {
             while !store.is_ready() {
                 tokio::task::yield_now().await;

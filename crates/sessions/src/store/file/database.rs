@@ -17,24 +17,24 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{JoinHandle, sleep};
 use std::time::Duration;
 
-/// Of what was written, in memory, before it goes to tables in order.
+/// Most written bytes in memory before they go to sorted tables on the disk.
 const MEMTABLE_BYTES: u64 = 16 << 20;
-/// Of blocks that were read.
+/// Memory for blocks of the tables that were read.
 const CACHE_BYTES: u64 = 8 << 20;
-/// The journal is kept to about this; the database takes no less.
+/// About the most bytes of all journals; the database takes no smaller bound.
 const JOURNAL_BYTES: u64 = 64 << 20;
-/// Space is given back when as many bytes of states were dropped.
+/// Space is given back once this many bytes of states were dropped.
 const COMPACTED_BYTES: u64 = 8 << 20;
-/// Of a disk's bytes, one of so many has to be free for a further session, and at most [`MAX_RESERVE`] of them: the
-/// frames of the sessions that are there need it, and the tables when they are rewritten.
+/// A new session is refused where less than one part in this many of the disk is free, and less than [`MAX_RESERVE`]
+/// bytes. The frames of the sessions in the store need this room, and so do tables while they are rewritten.
 const RESERVE: u64 = 10;
 const MAX_RESERVE: u64 = 1 << 30;
 /// Most rows, and most marks of ended sessions, that are dropped in one transaction.
 const SWEPT_ROWS: usize = 1024;
-/// Of an entry without a state in memory, with what the map has beside it.
+/// About the bytes that an entry without a state takes in memory, with the map's own.
 pub(super) const ENTRY_BYTES: u64 = 128;
 
-/// Why a database cannot be used that was removed, or is on a disk that is not there.
+/// The reason where the database was removed, or its disk is not there.
 pub(super) const GONE: &str = "the store's files are not there any more";
 
 /// A key that is no session's id.
@@ -43,10 +43,10 @@ const NO_SESSION: [u8; 1] = [0];
 /// Why a folder cannot be used as a store.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// Another process has it.
+    /// Another process has the folder.
     #[error("another process uses the store in {0}: give each process a folder of its own")]
     Locked(PathBuf),
-    /// The system says no.
+    /// The system refused a call.
     #[error("the store in {folder} cannot be opened: {source}")]
     Io {
         /// The folder.
@@ -54,7 +54,7 @@ pub enum OpenError {
         /// What the system says.
         source: io::Error,
     },
-    /// Its files are damaged.
+    /// The database's files are damaged.
     #[error(
         "the files of the store in {folder} are damaged ({reason}): put a copy of the folder in its place, or move it \
          away to begin without its sessions"
@@ -95,13 +95,13 @@ impl OpenError {
     }
 }
 
-/// Whether an error is of the system, and not of what a file holds, of one that is missing or should not be there, or
-/// of one that is so short that the database reads from before its beginning.
+/// Whether an error comes from the system. One that comes from a file's content is damage, as is a file that is
+/// missing, should not be there, or is so short that the database seeks to before its beginning (`InvalidInput`).
 fn is_of_system(error: &io::Error) -> bool {
     use io::ErrorKind as Kind;
     match error.kind() {
         Kind::NotFound | Kind::AlreadyExists | Kind::InvalidInput => false,
-        // Where a temporary file is written, these come without the system's number.
+        // Errors while a temporary file is written come without the system's number.
         Kind::StorageFull
         | Kind::QuotaExceeded
         | Kind::FileTooLarge
@@ -111,16 +111,16 @@ fn is_of_system(error: &io::Error) -> bool {
     }
 }
 
-/// What the database has, each by its key.
+/// The tables of the database.
 pub(super) struct Tables {
     /// Rows by the sessions' ids.
     pub(super) rows: SingleWriterTxKeyspace,
     /// States by the sessions' ids.
     pub(super) states: SingleWriterTxKeyspace,
-    /// Until when it is known that a session was ended, by its name.
+    /// Marks of ended sessions, by id and incarnation: the moment until which each mark stays.
     pub(super) ended: SingleWriterTxKeyspace,
-    /// What the store notes of itself, by name, each with the moment until which it holds. v0.1.0 had idempotency keys
-    /// here.
+    /// The store's notes on itself, by name, each with the moment until which it holds. In a folder of v0.1.0 there are
+    /// idempotency keys among them.
     pub(super) notes: SingleWriterTxKeyspace,
 }
 
@@ -132,14 +132,14 @@ impl Tables {
 
 pub(super) struct Database {
     folder: PathBuf,
-    /// Has handles of the others, so it is waited for before they are dropped.
+    /// The thread that gives back space. It has handles of the tables, so it is waited for before they are dropped.
     compaction: Option<JoinHandle<()>>,
     is_closing: Arc<AtomicBool>,
     pub(super) tables: Tables,
     inner: SingleWriterTxDatabase,
-    /// Of what is in memory and not in tables yet.
+    /// Bytes in memory that are not in tables yet.
     written_bytes: u64,
-    /// Of states that were dropped and may still take space.
+    /// Bytes of states that were dropped and may still take space.
     dropped_bytes: u64,
 }
 
@@ -147,7 +147,7 @@ impl Drop for Database {
     fn drop(&mut self) {
         self.is_closing.store(true, Ordering::Release);
         if let Some(compaction) = self.compaction.take() {
-            // One that panicked has logged it.
+            // A thread that panicked has logged its panic.
             let _ = compaction.join();
         }
     }
@@ -175,7 +175,7 @@ impl Database {
         })?;
         let database = opened.map_err(|error| OpenError::of(folder, error))?;
         for (path, length) in written {
-            // A journal that is not there any more was wholly read.
+            // A journal that is not there any more was read to its end.
             let kept = path.metadata().map_or(length, |metadata| metadata.len());
             if kept < length {
                 tracing::warn!(
@@ -189,8 +189,8 @@ impl Database {
         Ok(database)
     }
 
-    /// Opens the database of a folder that has one. A folder without is that of a disk which is not there: the sessions
-    /// are on the disk, and would be told to be lost.
+    /// Opens the database of a folder that has one. A folder without one may be that of a disk which is not there. A
+    /// new database would then tell clients that their sessions are lost.
     ///
     /// # Errors
     /// See [`OpenError`].
@@ -209,8 +209,8 @@ impl Database {
             .cache_size(CACHE_BYTES)
             .worker_threads(1)
             .open()?;
-        // The database would ask its worker for each write above the limit, and its queue may be full then. So it is
-        // told here when to write tables.
+        // Above this limit the database asks its worker at each write, whose queue may be full. So there is no limit,
+        // and `account` lets it write tables.
         let options = || KeyspaceCreateOptions::default().max_memtable_size(u64::MAX);
         Ok(Self {
             folder: folder.to_owned(),
@@ -229,8 +229,8 @@ impl Database {
         })
     }
 
-    /// Whether its files can still be found in the folder. The system goes on writing those that were removed, which
-    /// nobody can open again. A folder that cannot be looked into, as for want of descriptors, counts as there.
+    /// Whether the journals are still in the folder. The system goes on writing to removed files, which nobody can open
+    /// again. A folder that cannot be read, for want of file descriptors say, counts as there.
     pub(super) fn is_there(&self) -> bool {
         match journal_paths(&self.folder) {
             Ok(paths) => !paths.is_empty(),
@@ -238,7 +238,7 @@ impl Database {
         }
     }
 
-    /// Whether the disk is nearly full. One that does not say counts as empty.
+    /// Whether the disk is nearly full. A disk that does not tell its free space counts as empty.
     pub(super) fn is_nearly_full(&self) -> bool {
         let Ok(disk) = rustix::fs::statvfs(&self.folder) else {
             return false;
@@ -291,7 +291,7 @@ impl Database {
         let mut rows = 0;
         for entry in snapshot.iter(&self.tables.rows) {
             let (id, row) = entry.into_inner()?;
-            // A row of another format is another version's, which knows when it is over.
+            // A row of another format belongs to another version of the program, which sweeps it.
             if let Ok(row) = Row::from_bytes(&row)
                 && row.expires <= now
             {
@@ -329,13 +329,14 @@ impl Database {
         Ok(rows == SWEPT_ROWS || marks == SWEPT_ROWS)
     }
 
-    /// Counts what was written. What is much goes to tables, and space that is not used is given back.
+    /// Counts what was written. From [`MEMTABLE_BYTES`] on, memory is written to tables; from [`COMPACTED_BYTES`] of
+    /// dropped states on, their space is given back.
     pub(super) fn account(&mut self, written: &Written) -> fjall::Result<()> {
         self.written_bytes += written.bytes;
         self.dropped_bytes += written.dropped_bytes;
         if written.bytes > 0 && self.written_bytes >= MEMTABLE_BYTES {
             self.written_bytes = 0;
-            // All of them, so that the journal up to here can go.
+            // All tables are written, so that the journal up to here can be removed.
             for table in self.tables.all() {
                 table.inner().rotate_memtable()?;
             }
@@ -349,7 +350,7 @@ impl Database {
         Ok(())
     }
 
-    /// Begins to give back space.
+    /// Starts the thread that gives back space.
     fn compact(&mut self) {
         self.dropped_bytes = 0;
         let tables = [&self.tables.states, &self.tables.rows];
@@ -365,8 +366,8 @@ impl Database {
     }
 }
 
-/// The calls of a group, which are written together. Each reads first and writes then, so one that fails has written
-/// nothing. In damaged tables the row and the state of a session may be of different frames: that is found out.
+/// The calls of a group, which are written together. Each call reads before it writes, so a call that fails has written
+/// nothing. In damaged tables the row and the state of a session may be of different frames: `Row::record` finds out.
 pub(super) struct Transaction<'a> {
     pub(super) inner: SingleWriterWriteTx<'a>,
     pub(super) database: &'a Database,
@@ -378,11 +379,11 @@ pub(super) struct Transaction<'a> {
 /// What a transaction writes.
 #[derive(Default)]
 pub(super) struct Written {
-    /// Whether an answer promises something that is written here.
+    /// Whether an answer promises that something written here is kept.
     pub(super) promises: bool,
-    /// Of what was written.
+    /// Bytes that were written.
     pub(super) bytes: u64,
-    /// Of the states that were dropped.
+    /// Bytes of the states that were dropped.
     pub(super) dropped_bytes: u64,
 }
 
@@ -393,7 +394,8 @@ impl Transaction<'_> {
     }
 }
 
-/// A moment, as it is written.
+/// The moment with which an entry begins, in milliseconds of the folder's time: 8 bytes, big-endian. None where the
+/// entry is shorter.
 pub(super) fn moment(bytes: &[u8]) -> Option<u64> {
     let (moment, _) = bytes.split_first_chunk()?;
     Some(u64::from_be_bytes(*moment))
@@ -407,7 +409,7 @@ fn compact(tables: &[Keyspace], is_closing: &AtomicBool) -> fjall::Result<()> {
             table.major_compact()?;
         }
     }
-    // The files from before go when the next tables are written.
+    // The database removes the replaced files when it writes the next tables.
     for table in tables {
         table.insert(NO_SESSION, [])?;
         write_tables(table, is_closing)?;
@@ -418,7 +420,7 @@ fn compact(tables: &[Keyspace], is_closing: &AtomicBool) -> fjall::Result<()> {
 /// Writes what is in memory to tables.
 fn write_tables(table: &Keyspace, is_closing: &AtomicBool) -> fjall::Result<()> {
     table.rotate_memtable()?;
-    // The database has no call that waits and can be stopped.
+    // The database has no call that waits for its worker and can be interrupted.
     while table.sealed_memtable_count() > 0 && !is_closing.load(Ordering::Acquire) {
         sleep(Duration::from_millis(10));
     }

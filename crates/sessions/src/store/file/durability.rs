@@ -1,14 +1,16 @@
-//! When the store in a file is synced to the disk.
+//! When the store in a folder syncs its files to the disk.
 
 use std::str::FromStr;
 use std::time::Duration;
 
-/// When what is written is synced, so that it outlives the power. A process that is killed loses nothing in either.
+/// When what is written is synced, so that it outlives a power cut. A process that is killed loses nothing in either
+/// case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Durability {
-    /// Before it is answered. Answers that are due at the same time share a sync.
+    /// Before the call that wrote it is answered. Answers that are due at the same time share a sync.
     Each,
-    /// At least once in so long: a power cut loses no more than what was answered since.
+    /// At least once in this time, from 1 ms to 1 h: a power cut loses no more than what was answered since the last
+    /// sync.
     Every(Duration),
 }
 

@@ -20,7 +20,7 @@ pub(super) fn make_folder(folder: &Path) -> io::Result<()> {
     builder.create(folder)
 }
 
-/// Whether there are tables of sessions: the database's own is the first one.
+/// Whether the database has tables of sessions. Its own table, which is always there, is named `0`.
 pub(super) fn has_tables(folder: &Path) -> io::Result<bool> {
     match folder.join(TABLES).read_dir() {
         Ok(entries) => {
@@ -33,7 +33,7 @@ pub(super) fn has_tables(folder: &Path) -> io::Result<bool> {
 }
 
 /// Refuses tables whose journals are gone, or were emptied: the database would go on without the sessions in them. A
-/// journal is as long as it may get from its beginning.
+/// journal file has its full length from the start, so one of length 0 was emptied.
 pub(super) fn check_journals(folder: &Path, journals: &[(PathBuf, u64)]) -> Result<(), OpenError> {
     let is_there = |(path, _): &(PathBuf, u64)| path.metadata().is_ok_and(|file| file.len() > 0);
     match journals.iter().any(is_there) {
@@ -45,8 +45,8 @@ pub(super) fn check_journals(folder: &Path, journals: &[(PathBuf, u64)]) -> Resu
     }
 }
 
-/// Takes away what a first start has left that was broken off, where no other process is at it: the database opens no
-/// folder that is not finished.
+/// Removes the files of a first start that was broken off, unless another process has locked the folder. The database
+/// would refuse a folder that is not set up completely.
 pub(super) fn clear_unfinished(folder: &Path) -> io::Result<()> {
     let Ok(lock) = File::options().write(true).open(folder.join("lock")) else {
         return Ok(());

@@ -4,7 +4,7 @@ use super::super::record::{Record, UnreadableRecord, Version};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
-/// The format of a row. Another one is not read.
+/// The format of a row. Rows of another format are not read.
 const FORMAT: u8 = 1;
 
 /// A row: all of a record but its state, which is written less often.
@@ -14,14 +14,14 @@ pub(super) struct Row {
     pub(super) incarnation: u64,
     /// When the time to live is over, in milliseconds of the folder's time.
     pub(super) expires: u64,
-    /// Of the state.
+    /// Length of the state.
     pub(super) state_bytes: u64,
     /// See [`Record::head`].
     head: Vec<u8>,
 }
 
 impl Row {
-    /// Of a new record.
+    /// The row of a new record.
     pub(super) fn of(record: &Record, expires: u64) -> Self {
         Self {
             version: record.version,
@@ -38,7 +38,7 @@ impl Row {
         (own.generation, own.frame) == (version.generation, version.frame)
     }
 
-    /// A format number, then the content in postcard's encoding.
+    /// The row as bytes: a format number, then the content in postcard's encoding.
     pub(super) fn to_bytes(&self) -> Vec<u8> {
         postcard::to_extend(self, vec![FORMAT]).expect("plain data is always encodable")
     }
@@ -46,7 +46,7 @@ impl Row {
     /// Reads what [`Self::to_bytes`] wrote.
     ///
     /// # Errors
-    /// It is damaged, or has another format.
+    /// The row is damaged, or has another format.
     pub(super) fn from_bytes(bytes: &[u8]) -> Result<Self, UnreadableRecord> {
         match bytes.split_first() {
             Some((&FORMAT, content)) => {
@@ -76,11 +76,12 @@ impl Row {
         self.version.frame = self.version.checkpoint;
     }
 
-    /// The record at its checkpoint. `state` is that which the database has: the number of its frame, and its bytes.
+    /// The record at its checkpoint. `state` is the entry of the table of states, as [`with_frame`] makes it; `now` is
+    /// in milliseconds of the folder's time.
     ///
     /// # Errors
-    /// The head cannot be read, or the state is of another frame: one that damaged files have kept from before or
-    /// after.
+    /// The head cannot be read, or the state is missing or of another frame than the checkpoint, as damaged files may
+    /// have it.
     pub(super) fn record(
         &self,
         state: Option<&[u8]>,
@@ -101,15 +102,15 @@ impl Row {
     }
 }
 
-/// A row, and a state as the database has it, of this record: what fuzzing begins with.
+/// The entries of a record in the tables of rows and of states: inputs that fuzzing begins with.
 #[cfg(fuzzing)]
 pub fn row_and_state(record: &Record) -> (Vec<u8>, Vec<u8>) {
     let row = Row::of(record, u64::MAX / 2).to_bytes();
     (row, with_frame(record.version.frame, &record.state))
 }
 
-/// The record of a row and a state that a folder may have, as a replica gets it that takes it over; so that fuzzing
-/// needs no folder.
+/// Reads the entries of a record in the tables of rows and of states, as for a replica that takes the record over.
+/// Fuzzing calls this, so that it needs no folder.
 ///
 /// # Errors
 /// See [`UnreadableRecord`].
@@ -120,7 +121,7 @@ pub fn record_of_row(row: &[u8], state: &[u8]) -> Result<Record, UnreadableRecor
     row.record(Some(state), 0)
 }
 
-/// A state as the database has it.
+/// The entry of a state in its table: the number of its frame as 8 bytes, big-endian, then the state.
 pub(super) fn with_frame(frame: u64, state: &[u8]) -> Vec<u8> {
     [&frame.to_be_bytes(), state].concat()
 }
@@ -130,7 +131,7 @@ mod tests {
     use super::*;
     use crate::store::record::tests::record;
 
-    /// Such a row was taken, and the thread of the store panicked when a replica took it over.
+    /// Taking over a row of the greatest generation would panic in the store's thread.
     #[test]
     fn a_row_whose_generation_cannot_be_counted_up_is_damaged() {
         let record = record(11, 3);

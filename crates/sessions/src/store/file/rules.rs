@@ -10,7 +10,7 @@ use uuid::Uuid;
 
 /// The note of the store's secret.
 const SECRET: &str = "secret";
-/// The moment at which a note is over.
+/// The moment until which notes hold.
 const NEVER: u64 = u64::MAX;
 
 /// Why a call did nothing.
@@ -25,7 +25,7 @@ pub(super) enum Fault {
 }
 
 impl Fault {
-    /// Whether what was written is damaged, rather than out of reach or another version's.
+    /// Whether what was read is damaged, rather than out of reach or of another version's format.
     fn is_damage(&self) -> bool {
         match self {
             Self::Database(fjall::Error::Io(_))
@@ -49,7 +49,7 @@ impl Transaction<'_> {
         self.now.saturating_add(milliseconds(ttl))
     }
 
-    /// The row of this id, if its time is not over. One that is damaged is lost.
+    /// The row of this id, if its time is not over. A damaged row is dropped.
     fn row(&mut self, id: Uuid) -> Result<Option<Row>, Fault> {
         let bytes = self.inner.get(&self.database.tables.rows, id.as_bytes());
         let row = bytes
@@ -71,7 +71,7 @@ impl Transaction<'_> {
         Ok(gone)
     }
 
-    /// What was read of a session. If it is damaged, the session is lost and dropped.
+    /// Returns what was read of a session. If that is damaged, drops the session and returns `None`.
     fn unless_damaged<T>(
         &mut self,
         id: Uuid,
@@ -95,7 +95,7 @@ impl Transaction<'_> {
             .insert(&self.database.tables.rows, *id.as_bytes(), bytes);
     }
 
-    /// The state of a session, after the number of its frame.
+    /// Writes the state of a session, after the number of its frame.
     fn put_state(&mut self, id: Uuid, frame: u64, state: &[u8]) {
         let bytes = with_frame(frame, state);
         self.written.bytes += bytes.len() as u64;
@@ -138,7 +138,8 @@ impl Transaction<'_> {
         Ok(row.record(state.as_deref(), self.now)?)
     }
 
-    /// Tells the record. `takes_over` says whether the replica that asks goes on from the checkpoint.
+    /// The conflict with a record of another version, at its checkpoint. With `takes_over` the replica that asks goes
+    /// on from there; where frames came after the checkpoint, this begins the next generation.
     fn tell(&mut self, id: Uuid, row: Row, takes_over: bool) -> Result<Outcome, Fault> {
         let mut row = row;
         let goes_back = takes_over && row.is_behind();
@@ -287,7 +288,7 @@ mod tests {
     use crate::store::file::database::Database;
     use fjall::PersistMode;
 
-    /// They were not counted, so the journal that has them stayed however many they were.
+    /// If marks were not counted as written, their journal would stay however long it is.
     #[test]
     fn marks_of_ended_sessions_count_as_written_and_are_dropped_in_parts() {
         let folder = tempfile::tempdir().unwrap();

@@ -10,7 +10,7 @@ use crate::sync::{Mutex, lock};
 use std::collections::HashMap;
 use std::time::Duration;
 
-/// A session that was counted so lately need not be written yet.
+/// The record of a session that was counted less than this time ago may not be written yet.
 const FRESH: Duration = Duration::from_secs(60);
 
 /// The counted sessions of each client.
@@ -23,7 +23,7 @@ pub(super) struct Shares {
 #[derive(Debug)]
 struct Member {
     session: Counted,
-    /// By the clock.
+    /// When the session was counted, by the clock.
     since: Duration,
 }
 

@@ -1,25 +1,27 @@
 //! The time by which what is in a folder expires.
 //!
-//! It passes as the monotonic clock does, so that no session ends because the wall clock is set: as that of a small
-//! board without a battery is, soon after its start. The folder has how far the wall clock is ahead of it, so that
-//! after a restart it goes on by the wall clock, and the time between counts.
+//! The folder's time passes as the monotonic clock does, so that no session ends because the wall clock is set. (A
+//! small board without a battery sets it soon after each start.) The folder keeps how far the wall clock is ahead of
+//! the folder's time. After a restart the folder's time follows from the wall clock and this difference, so the time in
+//! between counts.
 
 use crate::clock::Clock;
 use std::time::Duration;
 
-/// The name of the note of it.
+/// The name of the note that keeps a [`Noted`].
 pub(super) const CLOCK: &str = "clock";
-/// Where the wall clock goes away from the monotonic one by so much, it was set, or the machine was suspended.
+/// Where the wall clock departs from the monotonic one by this many milliseconds, it was set, or the machine was
+/// suspended.
 const SET_MS: i64 = 1000;
-/// The time is noted so often at least.
+/// The time is noted at least once in this many milliseconds.
 const NOTED_MS: u64 = 60_000;
 
-/// What a folder has of its time.
+/// What a folder keeps of its time, in milliseconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Noted {
-    /// How far the wall clock is ahead.
+    /// How far the wall clock is ahead of the folder's time.
     ahead: i64,
-    /// The time itself. It never goes back, also where a clock begins in 1970 each time.
+    /// The folder's time. It never goes back, even where the wall clock begins in 1970 at each start.
     now: u64,
 }
 
@@ -43,7 +45,7 @@ impl Noted {
 /// The time of a folder, in milliseconds: since 1970, where the wall clock was never set.
 pub(super) struct Time {
     clock: Clock,
-    /// At the clock's beginning.
+    /// The folder's time at the clock's beginning.
     start: i64,
     noted: Noted,
 }
@@ -74,7 +76,7 @@ impl Time {
         (is_set || is_old).then_some(Noted { ahead, now })
     }
 
-    /// This was noted.
+    /// Remembers what was noted last.
     pub(super) fn note(&mut self, noted: Noted) {
         self.noted = noted;
     }

@@ -22,7 +22,7 @@ const SWEEP: Duration = Duration::from_secs(1);
 /// Least and most time before a database that failed is opened again.
 const REOPEN: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(4));
 
-/// What others may know of the thread.
+/// What the thread tells those who call it.
 #[derive(Debug, Default)]
 pub(super) struct Health {
     pub(super) is_up: AtomicBool,
@@ -35,15 +35,15 @@ pub(super) struct Health {
 
 /// A call on its way to the thread.
 pub(super) trait Call: Send {
-    /// Does it in a transaction, and keeps what comes of it. False where it could not be done.
+    /// Does the call in a transaction, and keeps the result. False where it could not be done.
     fn run(&mut self, transaction: &mut Transaction<'_>) -> bool;
-    /// Whether nobody waits for its answer any more: who asked was told that there is none.
+    /// Whether nobody waits for the answer any more: the caller's time is over.
     fn is_given_up(&self) -> bool;
-    /// Answers, when the transaction is written or nothing of it is.
+    /// Sends the result, or the reason why the transaction was not written.
     fn answer(self: Box<Self>, written: Result<(), StoreUnavailable>);
 }
 
-/// A call by a rule.
+/// A call that applies a rule to the transaction.
 pub(super) struct Ruled<T, F> {
     pub(super) rule: F,
     pub(super) found: Option<Result<T, Fault>>,
@@ -72,7 +72,7 @@ where
         let found = found.map(|found| found.map_err(|fault| StoreUnavailable(fault.to_string())));
         let unasked = || Err(StoreUnavailable("it was not asked".to_owned()));
         let answer = written.and_then(|()| found.unwrap_or_else(unasked));
-        // Whoever asked may have gone.
+        // The caller may have gone.
         let _ = sender.send(answer);
     }
 }
@@ -83,14 +83,14 @@ pub(super) struct Writer {
     durability: Durability,
     time: Time,
     health: Arc<Health>,
-    /// None while it cannot be written.
+    /// `None` while its files cannot be written.
     database: Option<Database>,
     /// When what was written last has to be synced.
     sync_due: Option<Instant>,
     sweep_due: Instant,
     reopen_due: Instant,
     pause: Duration,
-    /// Why it could not be written the last time.
+    /// Why the database could not be written the last time.
     reason: String,
 }
 
@@ -146,7 +146,7 @@ impl Writer {
         }
     }
 
-    /// How long nothing has to be done without a call.
+    /// How long the thread may wait for a call until something else is due.
     fn idle_time(&self) -> Duration {
         let due = match self.database {
             Some(_) => self.sync_due.unwrap_or(self.sweep_due).min(self.sweep_due),
@@ -221,7 +221,7 @@ impl Writer {
         reason.to_owned()
     }
 
-    /// Does what is due.
+    /// Does what is due: opens the database again, syncs, probes or sweeps it.
     fn maintain(&mut self) {
         let begun = now();
         let Some(database) = &mut self.database else {
@@ -238,7 +238,7 @@ impl Writer {
             }
         }
         if self.health.is_late.load(Ordering::Acquire) {
-            // No call may come before the store is known to answer again.
+            // A store that is not ready may get no calls, so the thread finds out by itself whether it can write.
             if let Err(error) = database.probe() {
                 self.fail(&error.to_string());
                 return;
@@ -264,7 +264,7 @@ impl Writer {
         }
     }
 
-    /// Writes what is to be noted of the time, if anything is.
+    /// Writes the note of the time, where it is due.
     fn note_time(&mut self, due: Option<Noted>) {
         let (Some(database), Some(noted)) = (&mut self.database, due) else {
             return;

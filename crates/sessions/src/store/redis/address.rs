@@ -21,7 +21,7 @@ pub(super) enum Kind {
     Server(Box<Client>),
     /// Nodes of a cluster, from which the others are found.
     Cluster(Box<ClusterClient>),
-    /// What stands in for one.
+    /// A program that stands in for a Redis.
     Given(Arc<dyn ScriptServer>),
 }
 
@@ -40,7 +40,7 @@ impl RedisAddress {
             };
             RedisAddressError(format!("no address of a store: {reason}"))
         };
-        // What follows would be dropped, with the host in it.
+        // The parser of URLs would drop what follows a `#`, and the host with it.
         if text.contains('#') {
             let reason = "no address of a store: a `#` in a password is written `%23`";
             return Err(RedisAddressError(reason.to_owned()));
@@ -63,7 +63,7 @@ impl RedisAddress {
         Ok(Self(Kind::Cluster(Box::new(cluster.map_err(failed)?))))
     }
 
-    /// That of what stands in for a Redis.
+    /// The address of a program that stands in for a Redis.
     pub fn of(server: Arc<dyn ScriptServer>) -> Self {
         Self(Kind::Given(server))
     }

@@ -25,7 +25,7 @@ const SECRET: Duration = Duration::from_secs(30 * 24 * 3600);
 const COUNTED: Duration = Duration::from_secs(7 * 24 * 3600);
 /// Most sessions of a client that are looked at together, where it has no room for another.
 const LOOKED_AT: usize = 32;
-/// How often so many are looked at for one that is to be counted.
+/// How often [`LOOKED_AT`] sessions are looked at before another one is refused.
 const MAX_LOOKS: usize = 4;
 /// How long a client for which no room was found in this way is refused without looking again.
 const REFUSED: Duration = Duration::from_secs(1);
@@ -69,7 +69,7 @@ async fn probe(store: Weak<Shared>) {
     }
 }
 
-/// What scripts answer.
+/// Reads the answer of a script.
 impl FromRedisValue for Outcome {
     fn from_redis_value(value: redis::Value) -> Result<Self, redis::ParsingError> {
         let parts: Vec<redis::Value> = FromRedisValue::from_redis_value(value)?;
@@ -95,8 +95,8 @@ impl FromRedisValue for Outcome {
 }
 
 impl RedisStore {
-    /// The store at this address. The keys of its records begin with `prefix`. Calls end after `timeout`; what it
-    /// counts of clients is as old as `clock` says. It waits for the first answer, and goes on without one.
+    /// The store at this address. The keys of its records begin with `prefix`. Calls end after `timeout`; `clock` tells
+    /// when sessions were counted. Waits for the first answer, and goes on without one after `timeout`.
     ///
     /// # Errors
     /// The address cannot be used.
@@ -127,18 +127,19 @@ impl RedisStore {
         milliseconds(clock.since_1970(clock.now()))
     }
 
-    /// Of a record. Braces make a cluster keep the keys of a session at one node.
+    /// The key of a record. Braces make a cluster keep the keys of a session at one node.
     fn key(&self, id: Uuid) -> String {
         format!("{}:session:{{{id}}}", self.0.prefix)
     }
 
-    /// Of the sessions of a client.
+    /// The key of a client's counted sessions.
     fn key_of_client(&self, client: &str) -> String {
         let name = blake3::hash(client.as_bytes()).to_hex();
         format!("{}:client:{name}", self.0.prefix)
     }
 
-    /// Counts a session; where there is no room, the sessions that were looked at longest ago.
+    /// Counts a session. Where the client has no room for it, returns those of its sessions that were looked at longest
+    /// ago.
     async fn try_admit(
         &self,
         share: &StoreShare,
@@ -171,7 +172,8 @@ impl RedisStore {
         refused.insert(client.to_owned(), now + REFUSED);
     }
 
-    /// Finds out which of these sessions of a client live. Their records may be at other nodes.
+    /// Finds out which of these sessions of a client live, and no longer counts the others. This takes a script for
+    /// each, as their records may be at other nodes.
     async fn recount(
         &self,
         share: &StoreShare,
@@ -247,7 +249,8 @@ impl SessionStore for RedisStore {
 
     fn load(&self, id: Uuid) -> StoreFuture<'_, Option<Record>> {
         let mut script = self.0.scripts.check.key(self.key(id));
-        // Whether a session was ended does not matter, and no record has this version.
+        // The second key should be the mark of an ended session, which does not matter here. No record has the empty
+        // version, so one that is there is told as a conflict.
         script.key(self.key(id));
         script.arg("").arg("").arg("");
         Box::pin(async move {
@@ -305,7 +308,7 @@ impl SessionStore for RedisStore {
         script.arg(name.incarnation).arg(milliseconds(ttl));
         Box::pin(async move {
             let ended = self.0.connection.call(script).await?;
-            // Its client has room again; who that is, is not known here.
+            // The session's client has room again. Which one that is, is not known here, so all are looked at again.
             lock(&self.0.refused).clear();
             Ok(ended)
         })
@@ -335,7 +338,7 @@ impl SessionStore for RedisStore {
     }
 }
 
-/// A name for one write.
+/// A random name for one write.
 fn token() -> String {
     format!("{:016x}", random::<u64>())
 }

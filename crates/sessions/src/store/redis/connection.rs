@@ -13,10 +13,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Between two attempts of one call.
+/// Time between two attempts of one call.
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// A connection that finds its way back by itself. Clones share it.
+/// A connection that connects again by itself. Clones share it.
 #[derive(Clone)]
 pub(super) enum Link {
     Server(ConnectionManager),
@@ -28,7 +28,7 @@ pub(super) enum Link {
 pub(super) struct Connection {
     address: RedisAddress,
     timeout: Duration,
-    /// With the number of links before it.
+    /// The link, with the number of links before it.
     link: Mutex<(u64, Link)>,
     is_up: AtomicBool,
     /// Whether the store refused the last write of a probe.
@@ -67,7 +67,7 @@ impl Link {
 }
 
 impl Connection {
-    /// To the store at this address, whose calls end after `timeout`. Nothing is sent yet.
+    /// A connection to the store at this address, whose calls end after `timeout`. Nothing is sent yet.
     pub(super) fn new(address: RedisAddress, timeout: Duration) -> RedisResult<Self> {
         let link = Link::new(&address, timeout)?;
         Ok(Self {
@@ -99,7 +99,7 @@ impl Connection {
     /// called.
     ///
     /// # Errors
-    /// There is no answer.
+    /// The store gives no answer in time, refuses the call, or answers something else than a `T`.
     pub(super) async fn call<T: FromRedisValue>(
         &self,
         script: ScriptCall<'_>,
@@ -122,7 +122,7 @@ impl Connection {
                     self.answers();
                     return Ok(value);
                 }
-                // It answers, but will not do this, however often it is asked.
+                // The store answers, but refuses this call however often it is sent.
                 Ok(Err(error)) if is_refusal(&error) => {
                     self.answers();
                     self.failures.fetch_add(1, Ordering::Relaxed);
@@ -168,7 +168,7 @@ impl Connection {
     /// Asks the store whether it is there and takes this write.
     ///
     /// # Errors
-    /// It does not.
+    /// The store gives no answer, or refuses the write.
     pub(super) async fn probe<T: FromRedisValue>(
         &self,
         write: ScriptCall<'_>,

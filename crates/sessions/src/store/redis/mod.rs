@@ -6,7 +6,7 @@
 //!
 //! What can go wrong, and what is done about it:
 //! - A script was done, and its answer was lost. Each write has a random token, which the record keeps. A script that
-//!   comes again with it does nothing.
+//!   is sent again with the same token does nothing.
 //! - The server is away or slow. A call ends after a bounded time with
 //!   [`StoreUnavailable`](super::session_store::StoreUnavailable); the next ones fail at once, until a probe in the
 //!   background has got an answer.

@@ -1,7 +1,7 @@
 //! The scripts that Redis runs, each as a whole.
 //!
-//! KEYS: the record's, and the one that is there after its session was ended. In a cluster all keys of a session are at
-//! one node.
+//! KEYS: the record's, and that of the mark that its session was ended. In a cluster all keys of a session are at one
+//! node.
 //!
 //! They answer `{0}` where there is no record, `{1, ttl}` where what was asked for was done, `{2, ttl, record}` where
 //! the record has another version, and `{3}` where the session was ended.
@@ -20,7 +20,7 @@ pub struct NewHash {
     pub key: String,
     /// The name of the field.
     pub field: &'static str,
-    /// What the field has.
+    /// The field's value.
     pub value: Bytes,
     /// How long the hash lives.
     pub ttl: Duration,
@@ -28,10 +28,10 @@ pub struct NewHash {
 
 /// What runs the scripts of a store in place of a Redis: the server of a simulation.
 pub trait ScriptServer: fmt::Debug + Send + Sync {
-    /// Makes the hash, where there is one, and runs this script, all of it or nothing.
+    /// Makes the hash `new`, where given, and runs the script: both or neither.
     ///
     /// # Errors
-    /// It is not known whether it ran; or the server refuses it.
+    /// The server refuses the script, or does not tell whether it ran.
     fn run<'a>(
         &'a self,
         new: Option<&'a NewHash>,
@@ -73,7 +73,7 @@ impl Script {
 }
 
 impl ScriptCall<'_> {
-    /// On this key too.
+    /// Adds a key.
     pub(super) fn key(&mut self, key: impl Into<String>) -> &mut Self {
         self.keys.push(key.into());
         self
@@ -84,15 +84,15 @@ impl ScriptCall<'_> {
         self
     }
 
-    /// On this hash too, which is made in one transaction with the script. A server that refuses the transaction gets
-    /// the value as the last argument.
+    /// Adds the key of a hash that is made in one transaction with the script. A server that refuses the transaction
+    /// gets the script alone, with the hash's value as its last argument.
     pub(super) fn on_new(&mut self, new: NewHash) -> &mut Self {
         self.key(new.key.clone());
         self.new = Some(new);
         self
     }
 
-    /// Lets a Redis run it.
+    /// Runs the script at a Redis.
     pub(super) async fn invoke(&self, link: &mut impl ConnectionLike) -> RedisResult<Value> {
         let mut invocation = self.script.hashed.prepare_invoke();
         for key in &self.keys {
@@ -105,8 +105,8 @@ impl ScriptCall<'_> {
             let done = transaction(new, &invocation).query_async(link).await;
             let is_refused = |error: &RedisError| error.clone().into_server_errors().is_some();
             match done {
-                // It does not know the script, or is not the node of this session any more, or has no room. What it
-                // says to the script alone is acted upon.
+                // The server does not know the script, is not the node of this session any more, or has no room. The
+                // client library handles the first two where the script is sent alone.
                 Err(error) if is_refused(&error) => invocation.arg(&new.value[..]),
                 done => return done.map(|(answer,)| answer),
             };
@@ -114,7 +114,7 @@ impl ScriptCall<'_> {
         invocation.invoke_async(link).await
     }
 
-    /// Lets this server run it.
+    /// Runs the script at this server.
     pub(super) async fn run_at(&self, server: &dyn ScriptServer) -> RedisResult<Value> {
         let new = self.new.as_ref();
         server
@@ -123,7 +123,7 @@ impl ScriptCall<'_> {
     }
 }
 
-/// The hash is made, then the script runs: nothing comes between.
+/// The transaction that makes the hash, and then runs the script.
 fn transaction(new: &NewHash, script: &ScriptInvocation<'_>) -> Pipeline {
     let ttl = i64::try_from(new.ttl.as_millis()).unwrap_or(i64::MAX);
     let mut transaction = redis::pipe();
@@ -144,7 +144,8 @@ local function absent()
 end
 ";
 
-/// Tells the record. `takes_over` says whether the replica that asks goes on from the checkpoint.
+/// Answers the record at its checkpoint. With `takes_over` the replica that asks goes on from there; where frames came
+/// after the checkpoint, this begins the next generation.
 const TELL: &str = r"
 local function tell(key, takes_over)
   local frame, checkpoint = unpack(redis.call('HMGET', key, 'frame', 'checkpoint'))
@@ -157,7 +158,7 @@ local function tell(key, takes_over)
 end
 ";
 
-/// Of a server with a bound of memory, which refuses writes then: whether it is nearly used up.
+/// Whether a server with a bound of memory has used more than nine tenths of it. At the bound it refuses writes.
 const NEARLY_FULL: &str = r"
 local function nearly_full()
   local memory = redis.call('INFO', 'memory')
@@ -183,7 +184,7 @@ return {1, ARGV[7]}
 ";
 
 /// ARGV: incarnation, milliseconds for which the session is known to have ended. Answers 0 where it had ended before.
-/// What is deleted first makes room, so this works where the memory is used up.
+/// It deletes first, which makes room, so this works where the memory is used up.
 const END: &str = r"
 local key, ended = KEYS[1], KEYS[2]
 local incarnation = redis.call('HGET', key, 'incarnation')
@@ -194,9 +195,9 @@ return is_here and 1 or 0
 ";
 
 /// ARGV: generation, frame before, frame after, token, milliseconds to live, whether the replica goes on from the
-/// record where it has another version ('1' or ''), and the state where it is written. KEYS has a third then, of a hash
-/// with the state alone. Without the state among ARGV, as Lua would copy and hash each of its bytes, this hash becomes
-/// the record.
+/// record where it has another version ('1' or ''), and the state where it is written. Where the state is written, the
+/// third of KEYS is a hash with the state alone, which becomes the record: Lua would copy and hash each byte of a state
+/// among ARGV. ARGV has the state only after the server refused the transaction that makes the hash.
 const COMMIT: &str = r"
 local key, new = KEYS[1], KEYS[3]
 if new and ARGV[7] then
@@ -258,7 +259,8 @@ return ARGV[1]
 
 /// KEYS: that of a client, whose members are its sessions as `id:incarnation:places:bytes`, by the time (in
 /// milliseconds) when they were looked at last. ARGV: member, time, most places, most bytes, milliseconds to keep the
-/// key, a number. Answers whether the session is counted, and else so many members that were looked at longest ago.
+/// key, most members to answer. Answers whether the session is counted and, where it is not, the members that were
+/// looked at longest ago.
 const ADMIT: &str = r"
 local places, bytes = 0, 0
 local function count(member)
