@@ -1,7 +1,7 @@
 //! The one place that asks for the time, and through which everything waits.
 //!
 //! Moments, sleeping and time-outs are tokio's, whose time a test pauses and moves (`start_paused`). Sessions expire by
-//! a [`Clock`], which moves forward for itself: so a test of the whole service need not wait either.
+//! a [`Clock`], which tests can move forward on its own, so a test of the whole service need not wait either.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -42,7 +42,7 @@ impl Default for Clock {
 }
 
 impl Clock {
-    /// One whose time of day is this.
+    /// A clock that takes the time of day from `wall`.
     pub fn with_wall(wall: fn() -> SystemTime) -> Self {
         Self {
             wall,
@@ -62,7 +62,7 @@ impl Clock {
         self.advanced_ms.fetch_add(ms, Ordering::Relaxed);
     }
 
-    /// The wall-clock time of a moment of this clock; none before 1970, which machines without a battery begin in.
+    /// The wall-clock time of a moment of this clock, at least 1970, in which machines without a battery begin.
     pub fn wall(&self, moment: Duration) -> SystemTime {
         SystemTime::UNIX_EPOCH + self.since_1970(moment)
     }

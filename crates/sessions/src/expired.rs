@@ -27,7 +27,7 @@ impl ExpiredIds {
         }
     }
 
-    /// Whether a session `id` of this owner has expired not long ago.
+    /// Whether a session `id` of this owner has expired less than [`KEPT`] ago, as far as it is remembered.
     pub(super) fn contains(&mut self, id: Uuid, owner: &Owner, now: Duration) -> bool {
         self.forget(now);
         self.owners.get(&id) == Some(owner)

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use uuid::Uuid;
 
-/// Of the sessions in the map, one in so many goes where there is no room.
+/// Where there is no room, one in this many of the idle sessions in the map is removed.
 const EVICTED: usize = 16;
 
 /// Why a session cannot be added.
@@ -21,23 +21,23 @@ pub enum InsertError {
     /// There is no room, or no memory for a state with its parameters.
     #[error(transparent)]
     Full(#[from] TooManySessions),
-    /// A live session has its id.
+    /// A live session has the new one's id.
     #[error("a live session has this id")]
     Taken,
 }
 
 impl Registry {
-    /// How long a new session waits for its first frame.
+    /// How long a new session lives without a frame.
     pub fn first_lease(&self) -> Duration {
         self.lease.first.min(self.lease.idle)
     }
 
-    /// How long a session waits for its next frame.
+    /// How long a session lives without a further frame.
     pub fn idle_lease(&self) -> Duration {
         self.lease.idle
     }
 
-    /// How a session is opened now, by a request with this digest.
+    /// The opening of a session by a request with this digest, now.
     pub fn opening(&self, request: [u8; 32], state: &SessionState) -> Opening {
         let expires = self.clock.now() + self.first_lease();
         Opening {
@@ -75,7 +75,7 @@ impl Registry {
         Ok(session)
     }
 
-    /// Memory for a state.
+    /// Takes memory for a state; `None` where there is none.
     fn hold(&self, state: &SessionState) -> Option<Charge> {
         let bytes = state.session_bytes();
         let held = self.memory.hold(bytes);
@@ -86,7 +86,8 @@ impl Registry {
         held
     }
 
-    /// Removes those sessions that were not used for longest, unless they are in use. They go on living in the store.
+    /// Removes the sessions whose last use is longest ago. Those in use, or without a record in the store, stay. The
+    /// removed ones live on in the store.
     fn evict(&self) {
         let idle = |session: &&Arc<Session>| !session.is_busy() && session.version().is_some();
         let mut oldest: Vec<(Duration, Uuid)> = {
@@ -98,7 +99,7 @@ impl Registry {
         let count = oldest.len().div_ceil(EVICTED);
         oldest.sort_unstable();
         for (_, id) in oldest.into_iter().take(count) {
-            // It may be in use by now, or another session may have its id. What is freed is freed after the lock.
+            // The session may be in use by now, or another one may have its id. It is freed after the lock is released.
             let _evicted = match lock(&self.sessions).entry(id) {
                 Entry::Occupied(entry) if idle(&entry.get()) => Some(entry.remove()),
                 _ => None,

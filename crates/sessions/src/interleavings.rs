@@ -1,8 +1,8 @@
 //! The map of sessions, the sessions and their streams in many orders of their threads: `cargo test --features shuttle
 //! --lib interleavings`. The queue, the workers and the budgets have [theirs](crate::scheduler).
 //!
-//! Each test runs in so many orders drawn at random, and in as many with few changes between threads, at drawn moments
-//! (PCT: Burckhardt and others, 2010). The draws are the same each time, but for `SHUTTLE_RANDOM_SEED=N`;
+//! Each test runs in a number of orders drawn at random, and in as many with few changes between threads, at drawn
+//! moments (PCT: Burckhardt and others, 2010). The draws are the same each time unless `SHUTTLE_RANDOM_SEED=N` is set;
 //! `BAGTRACK_ORDERS=N` multiplies their number. A failure prints its order, which `shuttle::replay` runs again.
 
 use crate::acts::{CreationKey, IdempotencyStore};
@@ -25,14 +25,14 @@ use std::time::Duration;
 use tokio::sync::Notify;
 use uuid::Uuid;
 
-/// The draws are these.
+/// The seed of the draws.
 const SEED: u64 = 34;
 /// Most changes between threads at drawn moments.
 const DEPTH: usize = 3;
-/// Of a thread's stack: a tracker needs more than the usual.
+/// Bytes of a thread's stack: a tracker needs more than the default.
 const STACK: usize = 256 << 10;
 
-/// Runs `test` in twice so many orders of its threads.
+/// Runs `test` in twice `schedules` orders of its threads.
 pub(crate) fn explore(schedules: usize, test: impl Fn() + Clone + Send + Sync + 'static) {
     let times = std::env::var("BAGTRACK_ORDERS").map_or(Ok(1), |times| times.parse::<usize>());
     let schedules = schedules * times.expect("BAGTRACK_ORDERS is a number");
@@ -46,7 +46,7 @@ pub(crate) fn explore(schedules: usize, test: impl Fn() + Clone + Send + Sync + 
 fn run(scheduler: impl Scheduler + 'static, test: impl Fn() + Send + Sync + 'static) {
     let mut config = Config::new();
     config.stack_size = STACK;
-    // Of orders of memory nothing is found: all atomics count as the strictest.
+    // shuttle would warn that it treats all atomics as sequentially consistent, so it finds no faults of weaker orders.
     config.silence_warnings = true;
     Runner::new(scheduler, config).run(test);
 }
@@ -65,7 +65,7 @@ const LEASE: Lease = Lease {
 /// The id that most tests use.
 const ID: Uuid = Uuid::from_u128(1);
 
-/// What a session begins with.
+/// The state of a new session.
 static STATE: LazyLock<SessionState> = LazyLock::new(|| {
     let luma = (0..32 * 24).map(|i| (i * 7 % 251) as u8).collect();
     let frame = Frame::from_luma(32, 24, luma).expect("a frame");
@@ -93,7 +93,7 @@ impl Drop for InMemory {
 }
 
 impl World {
-    /// Room for so many sessions, which a store has, too, where there is one.
+    /// A registry with room for `max_sessions` sessions. With a store, sessions may be removed from memory.
     fn new(max_sessions: usize, has_store: bool) -> Self {
         let clock = Clock::default();
         let registry = Registry::new(max_sessions, 2, LEASE, clock.clone());
@@ -123,7 +123,7 @@ impl World {
             state,
             held: Box::new(InMemory(self.in_memory.clone())),
         })?;
-        // A session that is freed under the lock of the map would wait for itself.
+        // A session that is freed under the lock of the map would wait for itself here.
         let registry = Arc::downgrade(&self.registry);
         let probe = move || {
             registry
@@ -134,7 +134,7 @@ impl World {
         Ok(session)
     }
 
-    /// So many sessions are in memory, as the map and the budget say.
+    /// Checks that `count` sessions are in memory, and that the map and the budget agree.
     fn assert_holds(&self, count: usize) {
         let in_memory = self.in_memory.load(Ordering::Acquire);
         let bytes = self.registry.memory.held();
@@ -166,7 +166,7 @@ fn the_map_never_holds_more_than_it_may() {
                 })
             });
             join(threads.collect::<Vec<_>>());
-            // With a store some go, where there was no room.
+            // With a store some sessions are removed where there was no room.
             match has_store {
                 true => world.assert_holds(world.registry.len()),
                 false => world.assert_holds(MOST),
@@ -206,7 +206,7 @@ fn a_session_ends_once_whoever_ends_it() {
             }),
             world.spawn(move |_| {
                 let Ok(permit) = session.enter() else { return };
-                // It has the session, or is told that this has ended.
+                // The request gets the session, or is told that this has ended.
                 drop(block_on(permit.lock()));
             }),
         ];
@@ -261,7 +261,7 @@ fn a_new_session_does_not_go_with_an_old_one_of_its_id() {
                 world.registry.remove(name);
             }),
         ];
-        // Its client has ended it, and opens one that no store has.
+        // The client has ended the session, and opens another one under its id that no store has.
         world.registry.forget(&old);
         drop(old);
         let new = world.open(ID, None);
@@ -283,7 +283,7 @@ fn of_two_streams_at_a_session_the_newer_has_the_place() {
             let streams = streams.clone();
             thread::spawn(move || streams.take(ID))
         });
-        // It is told, however late it asks.
+        // The replaced stream is told, however late it asks.
         block_on(first.replaced());
         let [second, third] = threads.map(|thread| thread.join().expect("a stream"));
         assert!(first.is_replaced());
@@ -298,7 +298,7 @@ fn of_two_streams_at_a_session_the_newer_has_the_place() {
         drop(first);
         assert!(!newer.is_replaced());
         thread.join().expect("a stream ends");
-        // Those that had it before have not taken it along.
+        // The streams that had the place before have not taken it away.
         let last = streams.take(ID);
         assert!(newer.is_replaced() && !last.is_replaced());
     });

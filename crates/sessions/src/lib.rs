@@ -1,7 +1,8 @@
 //! The live sessions: a map of them, and what keeps them apart.
 //!
-//! In: a [`SessionState`], which is a tracker for each target and the answers to the last frames: [`KEPT_ANSWERS`] of
-//! them, or all of the last request where these are more. Out: a [`Session`] in the [`Registry`], found by its id.
+//! In: a [`SessionState`], which is a tracker for each target and the stored answers: to the last [`KEPT_ANSWERS`]
+//! frames, or to all frames of the last request where these are more. Out: a [`Session`] in the [`Registry`], found by
+//! its id.
 //!
 //! [`SessionService`] is the one door. A request for a session takes these steps: [`SessionService::find`] finds it for
 //! its owner, [`Session::enter`] takes one of its few permits, [`Charge::grow`] charges the bytes of its body as they
@@ -13,8 +14,8 @@
 //! - Two requests step one tracker at once. A session has a lock of its own, taken in order of arrival.
 //! - Work outlives the request that asked for it. It keeps its permits until it has really ended.
 //! - A client loses the answer to a frame. It sends the frame again with its number: see [`ReplayError`].
-//! - A client never ends its session. It expires when no frame came for a while, by a [`Clock`] that tests can move
-//!   forward; sooner where none came at all.
+//! - A client never ends its session. The session expires when no frame comes for a while, sooner where none came at
+//!   all. Time passes by a [`Clock`] that tests can move forward.
 //! - A snapshot comes back damaged or forged. It carries a code under a key of the service ([`MacKeys`]), and all in it
 //!   is checked and bounded: see [`SnapshotError`].
 

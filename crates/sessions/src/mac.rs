@@ -10,10 +10,10 @@ use crate::random::random;
 
 type Key = [u8; blake3::KEY_LEN];
 
-/// What the key is derived from that stands for "unsigned". It is no secret: its code is a checksum.
+/// From this the key is derived that stands for "unsigned". The key is no secret, so its codes are mere checksums.
 const UNSIGNED: &[u8] = b"";
 
-/// Keys for one use: one signs, and several are accepted, so that secrets can be replaced one after the other.
+/// Keys for one use: one key signs, and several are accepted, so that secrets can be replaced one after the other.
 #[derive(Clone)]
 pub struct MacKeys {
     context: &'static str,

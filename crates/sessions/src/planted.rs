@@ -1,5 +1,5 @@
-//! Faults that a simulation must find. They are in builds with the feature `planted-faults` only, and there one at a
-//! time.
+//! Faults that a simulation must find. They exist only in builds with the feature `planted-faults`, and a thread has
+//! one at a time.
 
 /// A fault of the code. Some are in the scripts of a Redis alone.
 #[cfg_attr(not(feature = "redis"), allow(dead_code))]
@@ -11,9 +11,9 @@ pub enum PlantedFault {
     TakesSilenceForConsent,
     /// A frame that the store did not take stays in memory.
     KeepsUncommitted,
-    /// The store takes a frame, whichever it had before.
+    /// The store takes a frame whatever its last frame is.
     CommitsOutOfOrder,
-    /// A record that is taken over brings its version, and not its state.
+    /// A replica that takes a record over takes its version, and keeps its own state.
     GoesOnWithOldState,
     /// The answer names a checkpoint that is not written.
     TellsEarlyCheckpoint,
@@ -49,13 +49,13 @@ impl PlantedFault {
         Self::BeginsWithoutFence,
     ];
 
-    /// Whether this thread has it.
+    /// Whether this thread has this fault.
     #[cfg(feature = "planted-faults")]
     pub(crate) fn is_here(self) -> bool {
         HERE.get() == Some(self)
     }
 
-    /// None is.
+    /// Without the feature no thread has a fault.
     #[cfg(not(feature = "planted-faults"))]
     pub(crate) const fn is_here(self) -> bool {
         false
@@ -67,7 +67,7 @@ thread_local! {
     static HERE: std::cell::Cell<Option<PlantedFault>> = const { std::cell::Cell::new(None) };
 }
 
-/// This thread has this fault from now on, or none.
+/// Gives this thread a fault, or none, from now on.
 #[cfg(feature = "planted-faults")]
 pub fn plant(fault: Option<PlantedFault>) {
     HERE.set(fault);

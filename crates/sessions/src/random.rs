@@ -1,7 +1,7 @@
 //! The one place that draws random numbers: ids, names of writes, seeds of trackers.
 //!
-//! They come from the thread's generator, which the system seeds. A simulation has one thread and seeds it itself, so
-//! that the same happens again.
+//! The numbers come from the thread's generator, which the system seeds. A simulation has one thread and seeds its
+//! generator, so that each run is the same.
 
 use rand::distr::uniform::{SampleRange, SampleUniform};
 use rand::distr::{Distribution, StandardUniform};
@@ -14,13 +14,13 @@ thread_local! {
     static SEEDED: RefCell<Option<ChaCha8Rng>> = const { RefCell::new(None) };
 }
 
-/// From now on what is drawn on this thread follows from `seed`: whoever knows it knows the ids and the keys. For
-/// simulations only.
+/// From now on all numbers of this thread follow from `seed`. For simulations only: who knows the seed knows all ids
+/// and keys.
 pub fn seed_this_thread(seed: u64) {
     SEEDED.set(Some(ChaCha8Rng::seed_from_u64(seed)));
 }
 
-/// A number of any value.
+/// A number drawn from all values of its type.
 pub fn random<T>() -> T
 where
     StandardUniform: Distribution<T>,
@@ -31,7 +31,7 @@ where
     })
 }
 
-/// A number of this range, which is not empty.
+/// A number drawn from this range, which must not be empty.
 pub fn random_range<T: SampleUniform>(range: impl SampleRange<T>) -> T {
     SEEDED.with_borrow_mut(|seeded| match seeded {
         Some(seeded) => seeded.random_range(range),

@@ -23,7 +23,7 @@ pub enum NoSession {
     /// There was none, or it was deleted, or it belongs to another client.
     #[error("there is no such session")]
     Unknown,
-    /// It was not used for too long.
+    /// No frame came for too long.
     #[error("the session has expired")]
     Expired,
     /// The store has no record of it, and its time was not over.
@@ -36,9 +36,9 @@ pub enum NoSession {
 pub struct Registry {
     pub(super) sessions: Mutex<HashMap<Uuid, Arc<Session>>>,
     pub(super) max_sessions: usize,
-    /// Whether sessions go where there is no room: a store has them.
+    /// Whether sessions that the store has are removed from memory where there is no room.
     pub(super) evicts: bool,
-    /// Locked for a moment only, and never together with the map.
+    /// Ids of expired sessions. Locked for a moment only, and never together with the map.
     expired: Mutex<ExpiredIds>,
     pub(super) max_requests: usize,
     pub(super) lease: Lease,
@@ -47,8 +47,8 @@ pub struct Registry {
 }
 
 impl Registry {
-    /// At most `max_sessions` sessions, each with at most `max_requests` requests at once. A session expires when no
-    /// frame comes within its lease.
+    /// A registry of at most `max_sessions` sessions, each with at most `max_requests` requests at once. A session
+    /// expires when no frame comes within its lease.
     pub fn new(max_sessions: usize, max_requests: usize, lease: Lease, clock: Clock) -> Self {
         Self {
             sessions: Mutex::default(),
@@ -62,19 +62,19 @@ impl Registry {
         }
     }
 
-    /// The states of all sessions together take at most so many bytes.
+    /// Bounds the states of all sessions together to `bytes` bytes.
     pub fn with_memory(mut self, bytes: usize) -> Self {
         self.memory = Budget::new(bytes);
         self
     }
 
-    /// Sessions that are not in use go where there is no room. A store has them.
+    /// Lets sessions that are not in use, and that a store has, be removed from memory where there is no room.
     pub fn with_eviction(mut self) -> Self {
         self.evicts = true;
         self
     }
 
-    /// There is no room for one more session.
+    /// The error where there is no room for one more session.
     pub(super) fn full(&self) -> TooManySessions {
         TooManySessions(self.max_sessions)
     }
@@ -99,10 +99,10 @@ impl Registry {
         session.filter(|session| !self.has_ended(session))
     }
 
-    /// The live session of this id and owner. This does not count as use.
+    /// The live session of this id and owner. This does not extend the session's life.
     ///
     /// # Errors
-    /// See [`NoSession`]. Of another owner's session nothing is told.
+    /// See [`NoSession`]. Another owner's session counts as unknown.
     pub fn find(&self, id: Uuid, owner: &Owner) -> Result<Arc<Session>, NoSession> {
         let ended = {
             let mut sessions = lock(&self.sessions);
@@ -128,7 +128,7 @@ impl Registry {
     }
 
     /// Ends a session. Work that has begun on it still gets its answer; requests that wait for it do not. False if
-    /// there is no such session: another one that has its id by now stays.
+    /// there is no such session. Another session that has its id by now stays.
     pub fn remove(&self, name: SessionName) -> bool {
         let removed = match lock(&self.sessions).entry(name.id) {
             Entry::Occupied(entry) if entry.get().name() == name => Some(entry.remove()),
@@ -142,7 +142,7 @@ impl Registry {
 
     /// Removes this session from memory, unless another one has its id by now. It may live on in the store.
     pub fn forget(&self, session: &Arc<Session>) {
-        // What is freed is freed after the lock.
+        // The session is freed after the lock is released.
         let _forgotten = match lock(&self.sessions).entry(session.id()) {
             Entry::Occupied(entry) if Arc::ptr_eq(entry.get(), session) => Some(entry.remove()),
             _ => None,
@@ -181,7 +181,7 @@ impl Registry {
     }
 
     pub(super) fn has_ended(&self, session: &Session) -> bool {
-        // Whoever was at it has renewed it before going, so whether it has expired is looked at last.
+        // A request renews the session before it gives its permit back. So the expiry is read after the permits.
         let is_busy = session.is_busy();
         session.is_closed() || (!is_busy && self.clock.now() >= session.expires())
     }
@@ -249,7 +249,7 @@ mod tests {
         let old = insert(&registry);
         clock.advance(Duration::from_secs(1));
         let newer = insert(&registry);
-        // The store has neither.
+        // The store has neither session, so neither may be removed.
         let full = registry.insert(new_session(&registry)).unwrap_err();
         assert_eq!(full, InsertError::Full(TooManySessions(2)));
         old.set_version(version);
@@ -291,7 +291,7 @@ mod tests {
         clock.advance(IDLE);
         let other = registry.insert(again()).unwrap();
         assert!(session.is_closed() && !other.is_closed());
-        // What is done to the one before is not done to this.
+        // Calls for the former session do not change its successor.
         registry.forget(&session);
         assert!(!registry.remove(session.name()));
         assert!(registry.is_live(other.id()));

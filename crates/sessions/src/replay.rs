@@ -1,16 +1,16 @@
 //! Frame numbers: which request holds the next frame, and which is an old one that was sent again.
 //!
 //! A client whose connection broke does not know whether its frame was taken. If it numbers its frames it can send the
-//! request again: the same bytes under the same number get the stored answer. The answers to the last requests are
-//! kept, so a request with several frames can be repeated too, and one after which others were answered.
+//! request again: the same bytes under the same number get the stored answer. The answers to the last frames are kept.
+//! So a request with several frames can be repeated too, and so can an earlier one after later frames were answered.
 
 use super::planted::PlantedFault;
 use super::targets::{Correction, Estimates, PerTarget};
 use bagtrack_tracker::{Estimate, Rect};
 use serde::{Deserialize, Serialize};
 
-/// The digest of an uploaded frame: XXH3-128 of its bytes as sent. It is not a cryptographic one: a client that forges
-/// a collision gets a wrong stored answer for its own session only.
+/// The digest of an uploaded frame: XXH3-128 of its bytes as sent. This hash is not cryptographic: a client that forges
+/// a collision gets a wrong stored answer, for its own session only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fingerprint(u128);
 
@@ -47,7 +47,7 @@ impl Answered {
         self.targets.first().estimate.frame
     }
 
-    /// Whether it answers these bytes, with this correction.
+    /// Whether this is the answer to these bytes, with this correction.
     fn is_of(&self, posted: Fingerprint, given: Option<Correction>) -> bool {
         let is_given = |correction: Correction| {
             let target = self.targets.as_slice().get(correction.target);
@@ -80,12 +80,12 @@ pub enum ReplayError {
     },
 }
 
-/// The answers to a request with the frames `posted`, which the client numbers from `number` on, where they were given
-/// before; none where it holds the next frame. `recent` are the answers to the last frames, at least one. `given` is
-/// the box, where the request corrects it.
+/// The stored answers to a request with the frames `posted`, which the client numbers from `number` on; `None` where
+/// the request begins with the next frame. `recent` are the answers to the last frames, at least one. `given` is the
+/// request's correction of a box, if any.
 ///
-/// A request is a replay if the answers to all its frames are stored, and their bytes (and the box) are the same. One
-/// without a number never is.
+/// A request is a replay if the answers to all its frames are stored, and their bytes (and the box) are the same. A
+/// request without a number never is a replay.
 ///
 /// # Errors
 /// See [`ReplayError`].

@@ -1,9 +1,9 @@
-//! Which answers of a track are given: all, those up to where a target is lost, or the key frames.
+//! Which answers of a track are written: all, those until a target is lost, or the key frames alone.
 
 use bagtrack_tracker::{Estimate, KeyFrames, Status};
 use std::mem;
 
-/// How far a box that is left out may be from the line between two key frames, in pixels.
+/// How far the box of a frame that is left out may be from the one interpolated between key frames, in pixels.
 const TOLERANCE: f64 = 1.0;
 
 /// Picks the rows of each target as they come. A row is whatever goes with an answer: a line of a file, an answer.
@@ -14,11 +14,12 @@ pub struct Selection<T> {
     targets: Vec<Target<T>>,
     /// The number of the frame, from 0.
     frame: u64,
-    /// The rows of the frame before that are key frames, where only those are wanted: its others are known now.
+    /// Where only key frames are wanted: rows of the previous frame that are key frames. The next frame tells whether
+    /// its other rows are.
     key_rows: Option<Vec<Numbered<T>>>,
 }
 
-/// What is known of a target.
+/// What is known of a target so far.
 #[derive(Debug)]
 struct Target<T> {
     key_frames: KeyFrames<Numbered<T>>,
@@ -34,7 +35,7 @@ struct Numbered<T> {
 }
 
 impl<T> Selection<T> {
-    /// For so many targets.
+    /// A selection for `targets` targets. `until_lost`: a target's first lost row is its last one.
     pub fn new(targets: usize, until_lost: bool, only_key_frames: bool) -> Self {
         let target = || Target {
             key_frames: KeyFrames::new(TOLERANCE),
@@ -48,8 +49,8 @@ impl<T> Selection<T> {
         }
     }
 
-    /// Takes the answers of a frame, one a target, with their rows, and gives the rows of one frame: of this one, or
-    /// where only key frames are wanted, of the one before it, whose key frames are certain now.
+    /// Takes the answers to a frame, one for each target, with their rows, and returns rows to write: those of this
+    /// frame or, where only key frames are wanted, those of the previous frame, whose key frames are known by now.
     pub fn take(&mut self, answers: impl IntoIterator<Item = (Estimate, T)>) -> Vec<T> {
         let frame = self.frame;
         self.frame += 1;
@@ -90,7 +91,7 @@ impl<T> Selection<T> {
         self.targets.iter().all(|target| target.has_ended)
     }
 
-    /// The rows of the last frame that are still to be given. What is taken afterwards begins another track.
+    /// The rows that are still to be written at the end of the track. What is taken afterwards begins another track.
     pub fn finish(&mut self) -> Vec<T> {
         let mut rows = self.key_rows.as_mut().map_or_else(Vec::new, mem::take);
         for target in &mut self.targets {

@@ -15,8 +15,8 @@ use std::time::Duration;
 use tokio::sync::{Mutex as AsyncMutex, Semaphore, watch};
 use uuid::Uuid;
 
-/// The client that a session belongs to: the name of its API key, or nobody where the service knows no keys. Others do
-/// not see the session.
+/// The client that a session belongs to: the name of its API key, or nobody where the service has no keys. Other
+/// clients do not see the session.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub struct Owner(Option<Arc<str>>);
 
@@ -32,7 +32,7 @@ impl Owner {
     }
 }
 
-/// How a session was opened: what a request that opens it again is compared with, and its answer.
+/// How a session was opened. A request that opens it again is compared with this, and gets the same answer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Opening {
     /// Digest of the request's frame and settings.
@@ -54,21 +54,21 @@ pub struct Lease {
     pub idle: Duration,
 }
 
-/// What a session is made of.
+/// The parts of which a session is made.
 pub struct NewSession {
     /// Its id: the client's own, or a random one.
     pub id: Uuid,
     /// How it was opened.
     pub opening: Opening,
-    /// Whose it is.
+    /// The session's owner.
     pub owner: Owner,
-    /// Which version of the record in the store this is, where there is one.
+    /// The version of the record in the store that `state` is; `None` where there is no store.
     pub version: Option<Version>,
-    /// It expires after this time without a frame.
+    /// The session expires after this time without a frame.
     pub ttl: Duration,
     /// The trackers and the last answers.
     pub state: SessionState,
-    /// What is kept until the session is freed.
+    /// What is held until the session is freed, such as its place in a quota.
     pub held: Reservation,
 }
 
@@ -82,14 +82,14 @@ pub struct Session {
     target_count: usize,
     params: Params,
     pub(super) state: Arc<AsyncMutex<SessionState>>,
-    /// The permits that are free. Each request at this session has one, the one at work included.
+    /// The free permits. Each request to this session has a permit, the one at work included.
     pub(super) permits: Arc<Semaphore>,
     max_requests: usize,
     /// The place of the session in its client's quota.
     _held: Reservation,
     /// The last answer, to be read and waited for without the lock.
     pub(super) latest: watch::Sender<Estimates>,
-    /// Requests with frames at this session.
+    /// Requests to this session that bring frames.
     pub(super) frame_requests: AtomicUsize,
     /// Which version of the record in the store the state goes on from. It changes under the lock of the state.
     version: Mutex<Option<Version>>,
@@ -168,7 +168,7 @@ impl Session {
         short_id(self.id)
     }
 
-    /// Whose the session is.
+    /// The session's owner.
     pub fn owner(&self) -> &Owner {
         &self.owner
     }
@@ -178,7 +178,7 @@ impl Session {
         &self.opening
     }
 
-    /// What the store calls it.
+    /// The session's name in the store.
     pub fn name(&self) -> SessionName {
         SessionName {
             id: self.id,
@@ -216,7 +216,7 @@ impl Session {
         *lock(&self.version)
     }
 
-    /// The state is that of the record in the store, or goes on from it.
+    /// Notes which version of the record in the store the state goes on from.
     pub(super) fn set_version(&self, version: Option<Version>) {
         *lock(&self.version) = version;
     }
@@ -242,13 +242,14 @@ impl Session {
         self.expires_ms.store(expires, Ordering::Relaxed);
     }
 
-    /// The session expires an idle time from now: a frame was taken, or only the service is to blame that it was not.
+    /// The session expires an idle time from now, or later where it would. For a frame that was taken, or that only the
+    /// service is to blame for not taking.
     pub fn renew(&self) {
         let expires = milliseconds(self.clock.now() + self.idle);
         self.expires_ms.fetch_max(expires, Ordering::Relaxed);
     }
 
-    /// Whether a request is at the session.
+    /// Whether a request has a permit of the session.
     pub fn is_busy(&self) -> bool {
         self.permits.available_permits() < self.max_requests
     }

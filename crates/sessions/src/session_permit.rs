@@ -1,4 +1,4 @@
-//! Being at a session, and having its state to oneself.
+//! The permits of requests to a session, and the exclusive use of its state.
 //!
 //! A request first takes one of a few permits ([`Session::enter`]), then the lock ([`SessionPermit::lock`]), and moves
 //! the [`LockedSession`] into the work on a worker thread. The lock is fair: requests are served in the order in which
@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::{OwnedMutexGuard, OwnedSemaphorePermit};
 
-/// How many frames a numbered one may be ahead of its turn.
+/// How many frames a numbered frame may be ahead of its turn.
 const MAX_EARLY: u64 = 16;
 
 /// All permits of the session are taken; try again later.
@@ -27,7 +27,7 @@ pub struct SessionBusy;
 pub struct SessionClosed;
 
 impl Session {
-    /// Takes a permit of the session, for frames. That alone does not keep the session alive for longer.
+    /// Takes a permit of the session, for frames. The permit alone does not extend the session's life.
     ///
     /// # Errors
     /// All permits are taken.
@@ -36,7 +36,7 @@ impl Session {
         Ok(self.frames_permit(permit.map_err(|_| SessionBusy)?))
     }
 
-    /// The same, but waits for a permit, in order of arrival. An ended session gives them, too.
+    /// The same, but waits for a permit, in order of arrival. An ended session gives permits, too.
     pub async fn enter_in_order(self: &Arc<Self>) -> SessionPermit {
         let permit = self.permits.clone().acquire_owned().await;
         let permit = permit.expect("the permits are never closed");
@@ -52,7 +52,7 @@ impl Session {
         }
     }
 
-    /// Takes a permit of the session, to look at it.
+    /// Takes a permit of the session, to read its state.
     ///
     /// # Errors
     /// All permits are taken.
@@ -68,7 +68,8 @@ impl Session {
     }
 }
 
-/// A permit to be at a session, which does not expire meanwhile. Given back when it is dropped.
+/// A permit for one request to a session, which does not expire meanwhile. Given back when the last clone by
+/// [`share`](Self::share) is dropped.
 #[derive(Debug)]
 pub struct SessionPermit {
     session: Arc<Session>,
@@ -83,7 +84,7 @@ impl SessionPermit {
         &self.session
     }
 
-    /// The same place, to look at the session before its turn.
+    /// The same permit again, to read the session before the frames' turn.
     pub fn share(&self) -> Self {
         Self {
             session: self.session.clone(),
@@ -93,31 +94,31 @@ impl SessionPermit {
         }
     }
 
-    /// Whether another request with frames was at the session when this one came.
+    /// Whether another request with frames had a permit when this one came.
     pub fn overlaps(&self) -> bool {
         self.overlaps
     }
 
-    /// Whether frame `number` comes a little before its turn.
+    /// Whether frame `number` comes before its turn, by at most 16 frames.
     pub fn is_early(&self, number: u64) -> bool {
         let early = number.saturating_sub(self.session.latest_frame() + 1);
         (1..=MAX_EARLY).contains(&early)
     }
 
-    /// Whether a frame that has come now may wait for its turn: the last free place of the session is left to the frame
-    /// whose turn it is.
+    /// Whether an early frame may wait for its turn: the last free permit of the session is left to the frame whose
+    /// turn it is.
     pub fn may_wait(&self) -> bool {
         self.session.permits.available_permits() > 0
     }
 
-    /// Waits for the turn of frame `number` where it comes a little early, at most so long.
+    /// Waits for the turn of frame `number` if it [is early](Self::is_early), at most for `patience`.
     pub async fn wait_for_turn(&self, number: u64, patience: Duration) {
         if !self.is_early(number) {
             return;
         }
         let mut latest = self.session.latest.subscribe();
         let turn = latest.wait_for(|latest| latest.first().frame + 1 >= number);
-        // Whoever came too early is told so by its number.
+        // A frame that is still early is refused later because of its number.
         let _ = timeout(patience, turn).await;
     }
 
@@ -145,7 +146,7 @@ impl Drop for SessionPermit {
     }
 }
 
-/// A session whose state belongs to one request.
+/// A session whose state one request uses exclusively.
 #[derive(Debug)]
 pub struct LockedSession {
     state: OwnedMutexGuard<SessionState>,
@@ -163,13 +164,13 @@ impl LockedSession {
         &mut self.state
     }
 
-    /// Goes on with this state, which goes on from this version of the record in the store.
+    /// Replaces the state by one that goes on from this version of the record in the store.
     pub fn replace(&mut self, state: SessionState, version: Option<Version>) {
         *self.state = state;
         self.session().set_version(version);
     }
 
-    /// The next generation of the record in the store has begun here.
+    /// Notes that this request began the next generation of the record in the store.
     pub fn fenced(&self) {
         let version = self.session().version();
         self.session().set_version(version.map(Version::fenced));

@@ -2,13 +2,13 @@
 //!
 //! Layout: [`MAGIC`], one version byte, the compressed content, and the code of all of these under a key of the service
 //! ([`MacKeys`]). The content is, in postcard's encoding: the trackers' snapshots, then the list of stored answers,
-//! each a digest and what was answered for each target. Where the session was opened with a list of boxes, the version
-//! is another one, and the number of targets comes first. Snapshots come from clients, so nothing in them is read
-//! before the code is checked. A service may accept unsigned ones, so all in them is bounded and checked nevertheless:
-//! of the stored answers only so many are kept as a session stores at most, and the tracker validates its own part.
+//! each with the frame's digest and the answer for each target. Where the session was opened with a list of boxes, the
+//! version is [`LIST_VERSION`], and the number of targets comes first. Snapshots come from clients, so nothing in them
+//! is read before the code is checked. A service may accept unsigned snapshots, so all in them is bounded and checked
+//! nevertheless: no more of the stored answers are kept than a session stores, and the tracker validates its own part.
 //!
-//! A tracker's own snapshot is a session too: that of a tracker in a page or a program, which has no key. It is
-//! accepted where unsigned ones are.
+//! A snapshot of a tracker alone counts as a session's too. It comes from a tracker in a page or a program, which has
+//! no key, so it is accepted where unsigned snapshots are.
 
 use super::compression;
 use super::mac::{MAC_BYTES, MacKeys};
@@ -24,11 +24,11 @@ use std::sync::Arc;
 
 /// The first bytes of every session snapshot.
 pub const MAGIC: &[u8] = b"\x89bagtrack\r\n";
-/// What keys for snapshots are derived for.
+/// The use for which keys of snapshots are derived (see [`MacKeys::new`]).
 pub const KEY_CONTEXT: &str = "bagtrack 2026-11 session snapshot";
-/// Of a session that was opened with a box.
+/// Format version of a session that was opened with a box.
 const VERSION: u8 = 4;
-/// Of a session that was opened with a list of boxes.
+/// Format version of a session that was opened with a list of boxes.
 const LIST_VERSION: u8 = 5;
 
 /// Why bytes are not a session.
@@ -40,7 +40,7 @@ pub enum SnapshotError {
     /// Changed on the way, or signed with a key that this service does not have.
     #[error("it was changed, or signed by a service with other keys (BAGTRACK_SNAPSHOT_KEYS)")]
     NotAuthentic,
-    /// A tracker's own, where unsigned ones are not accepted.
+    /// A snapshot of a tracker alone, where unsigned snapshots are not accepted.
     #[error("it is not signed, and this service takes signed ones alone (--unsigned-snapshots)")]
     Unsigned,
     /// Written by another version of the program.
@@ -65,8 +65,8 @@ impl SessionState {
         bytes
     }
 
-    /// The session that a snapshot holds, with the last `max_recent` of its stored answers. One with a second opinion
-    /// is that of `expert`, which is the one of this process.
+    /// The session that a snapshot holds, with the last `max_recent` of its stored answers. A tracker with a second
+    /// opinion goes on with `expert`, that of this process.
     ///
     /// # Errors
     /// See [`SnapshotError`].
@@ -89,7 +89,8 @@ impl SessionState {
         Self::from_stored(content, max_recent, expert, None)
     }
 
-    /// The session of a tracker that was elsewhere until now. Which bytes its last frame had is not known.
+    /// A session from the snapshot of a tracker alone. The bytes of its last frame are unknown, so the digest of the
+    /// snapshot stands in for theirs.
     fn of_tracker(
         bytes: &[u8],
         keys: &MacKeys,
@@ -139,8 +140,8 @@ impl SessionState {
         bytes
     }
 
-    /// The session that [`Self::stored`] wrote. What it has in common with `known`, the session at another frame, is
-    /// not computed again.
+    /// The session that [`Self::stored`] wrote. Trackers reuse what they have in common with `known`, the same session
+    /// at another frame.
     ///
     /// # Errors
     /// See [`SnapshotError`].
@@ -183,7 +184,7 @@ impl SessionState {
     }
 }
 
-/// The version, and what follows it.
+/// Splits bytes into the format version and what follows it.
 fn check_version(bytes: &[u8]) -> Result<(u8, &[u8]), SnapshotError> {
     let body = bytes.strip_prefix(MAGIC).ok_or(SnapshotError::Damaged)?;
     let (&version, body) = body.split_first().ok_or(SnapshotError::Damaged)?;
@@ -193,7 +194,7 @@ fn check_version(bytes: &[u8]) -> Result<(u8, &[u8]), SnapshotError> {
     }
 }
 
-/// One of what `next` gives, or a list of `count`.
+/// One value of `next`, or a list of `count` of them.
 fn per_target<T>(
     count: Option<usize>,
     mut next: impl FnMut() -> Result<T, SnapshotError>,
@@ -204,7 +205,7 @@ fn per_target<T>(
     })
 }
 
-/// The last `max` stored answers of a list that takes all of `bytes`. Only those are ever held.
+/// The last `max` stored answers of a list that takes all of `bytes`. No more than `max` are in memory at a time.
 fn recent(
     bytes: &[u8],
     targets: Option<usize>,

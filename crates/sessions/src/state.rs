@@ -10,14 +10,13 @@ use std::sync::Arc;
 #[derive(Debug, Clone)]
 pub struct SessionState {
     pub(super) targets: Targets,
-    /// The answers to the last frames, oldest first, at least one: to those of the last request, and to so many before
-    /// them as that request asked for.
+    /// The stored answers to the last frames, oldest first, at least one; [`store`](Self::store) says how many.
     pub(super) recent: Vec<Answered>,
 }
 
 impl SessionState {
     /// A session that starts with `boxes` in `frame`, whose file has this digest, and with `expert` beside its trackers
-    /// where there is one. Before each target `check` says whether to go on.
+    /// where there is one. `check` is called before each target, and its error stops the work.
     ///
     /// # Errors
     /// See [`StartError`].
@@ -79,13 +78,13 @@ impl SessionState {
         self.targets.frame_format()
     }
 
-    /// Bytes that the session keeps at most.
+    /// Most bytes that the session keeps.
     pub fn session_bytes(&self) -> usize {
         self.targets.session_bytes()
     }
 
-    /// The stored answers from frame `number` on, oldest first; none where one of them is not stored any more. All have
-    /// been answered from the next frame on.
+    /// The stored answers from frame `number` on, oldest first; `None` where one of them is not stored any more. From
+    /// the next frame on the list is empty.
     pub fn answers_from(&self, number: u64) -> Option<Vec<Estimates>> {
         let next = self.latest_frame() + 1;
         let count = usize::try_from(next.checked_sub(number)?).ok()?;
@@ -97,7 +96,7 @@ impl SessionState {
     /// The stored answer to frame `number`, which has this digest and was answered.
     ///
     /// # Errors
-    /// It is no longer stored, or was the answer to another frame.
+    /// The answer is no longer stored, or its frame had another digest.
     pub fn stored_answer(
         &self,
         number: u64,
@@ -106,20 +105,20 @@ impl SessionState {
         replay::stored(&self.recent, number, posted).map(Answered::estimates)
     }
 
-    /// Stores new answers, and of those before them as many as make `kept` together.
+    /// Stores new answers, and keeps older ones as long as there are no more than `kept` in all.
     pub(super) fn store(&mut self, answered: Vec<Answered>, kept: usize) {
         let older = kept.saturating_sub(answered.len()).min(self.recent.len());
         self.recent.drain(..self.recent.len() - older);
         self.recent.extend(answered);
     }
 
-    /// Tracks through a frame with this digest, in which the user may correct a target, which there must be. Between
-    /// targets `meter` says whether to go on. The answer is to be [stored](Self::store). `seen` becomes what the
-    /// trackers saw.
+    /// Tracks through a frame with this digest. `correction`, where given, sets the box of one of the targets. Between
+    /// targets `meter` may stop the work. The caller [stores](Self::store) the answer. `seen` gets the diagnostics of
+    /// each tracker.
     ///
     /// # Errors
-    /// The tracker refused the frame or the box, or the work was stopped. Some targets may have taken the frame then,
-    /// so callers work on a copy.
+    /// The tracker refused the frame or the box, or the work was stopped. Some trackers may have taken the frame by
+    /// then, so callers work on a copy.
     pub(super) fn step(
         &mut self,
         frame: Frame,
@@ -130,14 +129,14 @@ impl SessionState {
     ) -> Result<Answered, TargetsError> {
         let frame = Arc::new(frame);
         let advanced = self.targets.advance(&frame, correction, meter, seen);
-        // Where another worker is still about to let go of it, its memory is not used again.
+        // Another worker may not have dropped its clone yet. Then the frame's memory is not used again.
         if let Some(frame) = Arc::into_inner(frame) {
             bagtrack_ingest::recycle(frame);
         }
         advanced.map(|()| self.answered(fingerprint, correction))
     }
 
-    /// The answer to the frame with this digest, which was the last.
+    /// The answer to the last frame, which has this digest.
     fn answered(&self, fingerprint: Fingerprint, correction: Option<Correction>) -> Answered {
         let mut targets = self.latest().map(|estimate| TargetAnswer {
             given: None,

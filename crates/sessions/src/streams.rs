@@ -1,5 +1,5 @@
-//! Which session has a stream: at most one, the newest. With a store, a stream at another replica has begun a new
-//! generation of the session's record.
+//! The streams of sessions. A session has at most one, the newest. A stream that begins at another replica begins a new
+//! generation of the record in the store, which tells the stream here that it is replaced.
 
 use crate::Session;
 use crate::sync::atomic::{AtomicBool, Ordering};
@@ -9,7 +9,7 @@ use std::sync::Arc;
 use tokio::sync::Notify;
 use uuid::Uuid;
 
-/// The open streams by their sessions. Clones are the same.
+/// The open streams by their sessions. Clones share the map.
 #[derive(Debug, Clone, Default)]
 pub struct OpenStreams(Arc<Mutex<HashMap<Uuid, Arc<Replacement>>>>);
 
@@ -26,12 +26,12 @@ pub struct StreamPlace {
     streams: OpenStreams,
     session: Uuid,
     replacement: Arc<Replacement>,
-    /// The generation of the session's record in the store, which began with the stream.
+    /// The generation that the session's record in the store had when the stream began.
     generation: Mutex<Option<u64>>,
 }
 
 impl OpenStreams {
-    /// Takes the place at this session. The stream that has it is told, and tracks no further frame.
+    /// Takes the place of the session's stream. The stream that has it is told, and tracks no further frame.
     pub fn take(&self, session: Uuid) -> StreamPlace {
         let replacement = Arc::new(Replacement::default());
         let before = lock(&self.0).insert(session, replacement.clone());
@@ -49,12 +49,12 @@ impl OpenStreams {
 }
 
 impl StreamPlace {
-    /// The stream begins at the session as it stands, or goes on with it after the store has lost its record.
+    /// Notes the session's generation: when the stream begins, and again after the store has lost the session's record.
     pub fn begin(&self, session: &Session) {
         *lock(&self.generation) = session.version().map(|version| version.generation);
     }
 
-    /// Whether the stream has ended, since another one has the place now, here or at another replica.
+    /// Whether another stream has the place now, here or at another replica, so that this one has ended.
     pub fn has_ended(&self, session: &Session) -> bool {
         let own = *lock(&self.generation);
         let now = session.version().map(|version| version.generation);
@@ -64,7 +64,7 @@ impl StreamPlace {
         self.is_replaced()
     }
 
-    /// Whether another stream has the place now.
+    /// Whether another stream is known to have the place.
     pub fn is_replaced(&self) -> bool {
         self.replacement.done.load(Ordering::Acquire)
     }

@@ -1,4 +1,4 @@
-//! Locks, atomics and threads: those of the system, or with the feature `shuttle` those whose order a test chooses.
+//! Locks, atomics and threads: those of `std`, or with the feature `shuttle` those whose order a test chooses.
 
 use tokio::sync::oneshot;
 
@@ -13,15 +13,15 @@ pub(crate) use std::{
     thread,
 };
 
-/// Takes a lock. Nothing panics while one is held, so what it guards is whole.
+/// Takes a lock. Nothing panics while a lock is held, so a poisoned one still guards whole data.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Blocks this thread until something was sent.
+/// Blocks this thread until the value was sent.
 ///
 /// # Errors
-/// Nothing will be.
+/// The sender is gone.
 pub(crate) fn wait_for<T>(sent: oneshot::Receiver<T>) -> Result<T, oneshot::error::RecvError> {
     #[cfg(feature = "shuttle")]
     return shuttle::future::block_on(sent);

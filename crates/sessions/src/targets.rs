@@ -1,7 +1,8 @@
 //! The targets of a session: a tracker for each, which all see the same frames.
 //!
-//! A frame is decoded once, in the format that the smallest target asks for. The trackers of larger ones reduce it to
-//! their own. Each target has draws of its own; the first one's are those of a session with this target alone.
+//! A frame is decoded once, in the format that the smallest target asks for. The trackers of larger targets reduce the
+//! frame to their own format. Each target has random numbers of its own; those of the first target are those of a
+//! session with this target alone.
 
 use super::scheduler::work_limit::{Stopped, WorkMeter};
 use bagtrack_tracker::{
@@ -15,19 +16,19 @@ pub const MAX_TARGETS: usize = 16;
 /// A value for each target of a session.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum PerTarget<T> {
-    /// Of the only target of a session that was opened with a box.
+    /// The value of the only target of a session that was opened with a box.
     One(T),
-    /// Of the targets of a session that was opened with a list of boxes, in its order: 1 to [`MAX_TARGETS`].
+    /// The values of the targets of a session that was opened with a list of boxes, in its order: 1 to [`MAX_TARGETS`].
     List(Vec<T>),
 }
 
 impl<T> PerTarget<T> {
-    /// Of the first target.
+    /// The value of the first target.
     pub fn first(&self) -> &T {
         &self.as_slice()[0]
     }
 
-    /// Of all targets, at least one.
+    /// The values of all targets, at least one.
     pub fn as_slice(&self) -> &[T] {
         match self {
             Self::One(one) => std::slice::from_ref(one),
@@ -35,7 +36,7 @@ impl<T> PerTarget<T> {
         }
     }
 
-    /// The same, to be changed.
+    /// The values of all targets, to be changed.
     pub fn as_mut_slice(&mut self) -> &mut [T] {
         match self {
             Self::One(one) => std::slice::from_mut(one),
@@ -43,10 +44,10 @@ impl<T> PerTarget<T> {
         }
     }
 
-    /// What `change` makes of each, which gets its target's number too.
+    /// Applies `change` to each target's number, counted from 0, and value.
     ///
     /// # Errors
-    /// The first of those of `change`.
+    /// The first error of `change`.
     pub fn try_map<U, E>(
         &self,
         mut change: impl FnMut(usize, &T) -> Result<U, E>,
@@ -64,7 +65,7 @@ impl<T> PerTarget<T> {
         })
     }
 
-    /// What `change` makes of each.
+    /// Applies `change` to each value.
     pub fn map<U>(&self, change: impl Fn(&T) -> U) -> PerTarget<U> {
         match self {
             Self::One(one) => PerTarget::One(change(one)),
@@ -73,7 +74,7 @@ impl<T> PerTarget<T> {
     }
 }
 
-/// Most bytes that the trackers of a list of targets keep together. The work on a frame holds a copy of them.
+/// Most bytes that the trackers of a list of targets keep together. Work on a frame needs as many again, for its copy.
 pub const MAX_LIST_BYTES: usize = 8 << 20;
 
 /// The answer to a frame: where each target is.
@@ -81,12 +82,12 @@ pub type Estimates = PerTarget<Estimate>;
 /// The box of each target.
 pub type Boxes = PerTarget<Rect>;
 
-/// The user says where a target is.
+/// A box that the user gives for a target in a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Correction {
     /// Which target, counted from 0.
     pub target: usize,
-    /// Its box.
+    /// Its box, in pixels of the uploaded frame.
     pub to: Rect,
 }
 
@@ -105,33 +106,33 @@ pub enum StartError {
     /// The tracker of one of the targets, counted from 0, does not take its box, or a parameter.
     #[error("target {target}: {error}")]
     Refused {
-        /// Which target.
+        /// The target's number, counted from 0.
         target: usize,
-        /// Why.
+        /// Why the tracker refused it.
         error: TrackerError,
     },
-    /// With these parameters the targets keep too much together.
+    /// With these parameters the targets together would keep more than [`MAX_LIST_BYTES`].
     #[error("{count} targets with these parameters keep more than {MAX_LIST_BYTES} bytes")]
     TooLarge {
-        /// How many targets there were to be.
+        /// The number of targets.
         count: usize,
     },
-    /// The work was stopped before all of them began.
+    /// The work was stopped before all targets were started.
     #[error(transparent)]
     Stopped(Stopped),
 }
 
-/// The trackers.
+/// The trackers of a session.
 #[derive(Debug, Clone)]
 pub(super) struct Targets(PerTarget<Tracker>);
 
-/// The format that serves all of `boxes` in uploads of the size `source`.
+/// The format in which frames are decoded for all of `boxes`, in uploads of the size `source` (width, height).
 pub fn frame_format(params: &Params, source: (u32, u32), boxes: &Boxes) -> FrameFormat {
     let formats = boxes.as_slice().iter();
     largest_format(formats.map(|target| params.frame_format(source, target)))
 }
 
-/// The format that no other exceeds on either side: all are reductions of one size.
+/// The smallest format that none of `formats` exceeds in width, height or colour.
 pub fn largest_format(formats: impl Iterator<Item = FrameFormat>) -> FrameFormat {
     let none = FrameFormat {
         size: (1, 1),
@@ -147,8 +148,8 @@ pub fn largest_format(formats: impl Iterator<Item = FrameFormat>) -> FrameFormat
 }
 
 impl Targets {
-    /// A tracker for each box in `frame`, with `expert` beside it where there is one. Before each of them `check` says
-    /// whether to go on.
+    /// A tracker for each box in `frame`, with `expert` beside it where there is one. `check` is called before each of
+    /// them, and its error stops the work.
     ///
     /// # Errors
     /// See [`StartError`].
@@ -193,7 +194,7 @@ impl Targets {
         largest_format(self.0.as_slice().iter().map(Tracker::frame_format))
     }
 
-    /// Bytes that the trackers keep at most.
+    /// Most bytes that the trackers keep.
     pub(super) fn session_bytes(&self) -> usize {
         let trackers = self.0.as_slice().iter();
         trackers
@@ -201,12 +202,12 @@ impl Targets {
             .sum()
     }
 
-    /// Tracks through a frame, in which the user may correct one target. Between targets `meter` says whether to go on.
-    /// Where workers are idle, they are tracked side by side.
-    /// `seen` becomes what each tracker saw.
+    /// Tracks through a frame. `correction`, where given, sets the box of one target. Between targets `meter` may stop
+    /// the work. Targets are tracked side by side where workers are idle. `seen` gets the diagnostics of each tracker
+    /// but that of a corrected target.
     ///
     /// # Errors
-    /// See [`TargetsError`]. With more than one target, some may have taken the frame then.
+    /// See [`TargetsError`]. With more than one target, some trackers may have taken the frame by then.
     pub(super) fn advance(
         &mut self,
         frame: &Arc<Frame>,
@@ -248,7 +249,7 @@ impl Targets {
     }
 }
 
-/// Tracks through a frame, and tells what the tracker saw where that is wanted.
+/// Tracks through a frame, and returns the tracker's diagnostics where they are wanted.
 fn step(
     tracker: &mut Tracker,
     frame: &Frame,

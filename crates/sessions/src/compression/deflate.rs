@@ -2,25 +2,26 @@
 
 use super::prefix_code::{self, Code};
 
-/// A block is some of these: neighbours whose bytes are alike.
+/// Bytes of a chunk. A block is one or more neighbouring chunks with similar counts of bytes.
 const CHUNK: usize = 4096;
 /// A block that is stored as it is has fewer than 2^16 bytes.
 const MAX_BLOCK: usize = 15 * CHUNK;
-/// What a block of its own must save. Its codes take 600 to 800 bits, the rest is for the time that they take: with
-/// half of this a state has 1.4 % fewer bytes, and takes a seventh longer to write.
+/// A block of its own must save this many bits. Its codes take 600 to 800 bits. The rest weighs the time that they
+/// take: with half of this value a state has 1.4 % fewer bytes, and takes a seventh longer to write.
 const MIN_SAVED_BITS: f32 = 3000.0;
 const END_OF_BLOCK: usize = 256;
-/// The bytes and the end of a block. The others in the format are for matches.
+/// The bytes and the end of a block. The format's other symbols are for matches.
 const SYMBOLS: usize = END_OF_BLOCK + 1;
-/// So that [`BitWriter`] takes four. The format has 15.
+/// Longest code of a byte. The format allows 15 bits; with 14, [`BitWriter`] takes four codes at once.
 const MAX_BITS: usize = 14;
 
-/// Of the code of lengths.
+/// Symbols of the code of lengths.
 const LENGTH_SYMBOLS: usize = 19;
 const MAX_LENGTH_BITS: usize = 7;
-/// What a block's codes take at most: 258 lengths of so many bits, and theirs.
+/// Most bits of a block's header: its fixed fields, the lengths of the code of lengths, and 258 lengths of at most
+/// [`MAX_LENGTH_BITS`].
 const MAX_HEADER_BITS: usize = 3 + 14 + 3 * LENGTH_SYMBOLS + (SYMBOLS + 1) * MAX_LENGTH_BITS;
-/// In which order its own lengths are written.
+/// The order in which the lengths of the code of lengths are written (RFC 1951, section 3.2.7).
 const ORDER: [usize; LENGTH_SYMBOLS] = [
     16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15,
 ];
@@ -53,7 +54,7 @@ pub(super) fn deflate(content: &[u8], out: &mut Vec<u8>) {
 struct Block {
     counts: [u32; END_OF_BLOCK],
     len: usize,
-    /// The bits that the bytes take at least, each for itself.
+    /// The entropy of the bytes as independent draws, in bits for the whole block.
     entropy: f32,
 }
 
@@ -80,7 +81,7 @@ impl Block {
     }
 
     fn counted(counts: [u32; END_OF_BLOCK], len: usize) -> Self {
-        // Several sums, which the compiler makes vectors of.
+        // Several sums, so that the compiler vectorises the loop.
         let mut sums = [0.0; 16];
         for counts in counts.as_chunks::<16>().0 {
             for (sum, &count) in sums.iter_mut().zip(counts) {
@@ -94,7 +95,7 @@ impl Block {
         }
     }
 
-    /// Writes the block with codes of its own, or as it is where these might make it longer.
+    /// Writes the block with codes of its own, or stored as it is where these might make it longer.
     fn write(&self, bytes: &[u8], is_last: bool, bits: &mut BitWriter<'_>) {
         let mut counts = [1; SYMBOLS];
         counts[..END_OF_BLOCK].copy_from_slice(&self.counts);
@@ -126,7 +127,7 @@ impl Block {
 fn times_log2(n: u32) -> f32 {
     let n = n.max(1) as f32;
     let exponent = (n.to_bits() >> 23) as i32 - 127;
-    // A parabola of the mantissa, in [1, 2), exact at both ends.
+    // log₂ of the mantissa, in [1, 2), as a parabola that is exact at both ends.
     let mantissa = f32::from_bits(n.to_bits() & 0x7F_FFFF | 0x3F80_0000);
     n * (exponent as f32 + (2.0 - mantissa / 3.0) * mantissa - 5.0 / 3.0)
 }
@@ -147,7 +148,7 @@ fn write_lengths(lengths: &[u8; SYMBOLS], bits: &mut BitWriter<'_>) {
     let own_lengths = prefix_code::lengths(&counts, MAX_LENGTH_BITS);
     let last = ORDER.iter().rposition(|&symbol| own_lengths[symbol] > 0);
     let written = &ORDER[..=last.expect("there are lengths").max(3)];
-    // The numbers of literals above 257, of distances above 1, and of what is written above 4.
+    // HLIT and HDIST are 0 (257 literals, one distance); HCLEN is the number of written lengths less 4.
     bits.write((written.len() as u16 - 4) << 10, 14);
     for &symbol in written {
         bits.write(own_lengths[symbol].into(), 3);
@@ -164,14 +165,15 @@ fn write_lengths(lengths: &[u8; SYMBOLS], bits: &mut BitWriter<'_>) {
     }
 }
 
-/// A length, or a run of them whose own length is `rest` above the shortest.
+/// A symbol of the code of lengths: one length, or a run of equal lengths. A run has `rest` more of them than the
+/// shortest run of its symbol.
 struct Run {
     symbol: u8,
     rest: u16,
     bits_of_rest: u32,
 }
 
-/// The lengths of the symbols, and of one distance that does not occur.
+/// The lengths of the symbols as runs, with that of one distance that does not occur.
 fn runs(lengths: &[u8; SYMBOLS]) -> Vec<Run> {
     let once = |symbol| Run {
         symbol,
@@ -208,7 +210,7 @@ fn runs(lengths: &[u8; SYMBOLS]) -> Vec<Run> {
     runs
 }
 
-/// Bits on their way to bytes: the first one is a byte's lowest.
+/// Writes bits to bytes: the first bit is a byte's lowest.
 struct BitWriter<'a> {
     bytes: &'a mut Vec<u8>,
     bits: u64,
@@ -231,7 +233,7 @@ impl<'a> BitWriter<'a> {
         self.count += u32::from(code.length);
     }
 
-    /// Writes the whole bytes; at most seven bits stay.
+    /// Appends the whole bytes to the output; at most seven bits are kept.
     #[inline(always)]
     fn flush(&mut self) {
         let whole = self.count / 8;
@@ -248,13 +250,13 @@ impl<'a> BitWriter<'a> {
         self.flush();
     }
 
-    /// Fills the last byte up.
+    /// Fills the last byte up with zeros.
     fn align(&mut self) {
         self.count = self.count.next_multiple_of(8);
         self.flush();
     }
 
-    /// Writes a block as it is.
+    /// Writes a block without compression.
     fn write_stored(&mut self, block: &[u8], is_last: bool) {
         self.write(is_last.into(), 3);
         self.align();

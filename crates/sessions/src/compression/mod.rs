@@ -1,7 +1,8 @@
 //! The compression of stored sessions and snapshots: DEFLATE with Huffman codes alone.
 //!
-//! A state is quantised numbers, in which few runs of bytes come twice. So none is searched for, which saves time.
-//! zlib-rs would write the same format in six times the time. fdeflate, which PNGs are read with, reads it.
+//! A state is quantised numbers, in which few runs of bytes come twice. So matches are not searched for, which saves
+//! time: zlib-rs would write the same format in six times the time. `fdeflate`, the decompressor of the PNG reader,
+//! reads it.
 
 mod deflate;
 mod prefix_code;
@@ -9,13 +10,14 @@ mod prefix_code;
 use super::targets::MAX_LIST_BYTES;
 use fdeflate::Decompressor;
 
-/// fdeflate wants a header of zlib before the bytes and its checksum after them. They have neither: each tracker's
-/// snapshot has a checksum.
+/// `fdeflate` wants a header of zlib before the bytes and a checksum after them. Stored states have neither, since each
+/// tracker's snapshot has a checksum. The decompressor ignores the value of this one.
 const ZLIB_HEADER: [u8; 2] = [0x78, 0x01];
 const ZLIB_CHECKSUM: [u8; 4] = [0; 4];
-/// A Huffman code has at least one bit, so no byte becomes more than these.
+/// A Huffman code has at least one bit, so a compressed byte becomes at most 8 bytes.
 const MAX_RATIO: usize = 8;
-/// No session has more: a list of targets is held to half of this, and the parameters hold one target below it.
+/// Most bytes of a state. A list of targets is bounded to half of this, and the ranges of the parameters keep one
+/// target below it.
 const MAX_BYTES: usize = 2 * MAX_LIST_BYTES;
 const LENGTH_BYTES: usize = 4;
 
@@ -29,7 +31,8 @@ pub(super) fn compress(content: &[u8], out: &mut Vec<u8>) {
     deflate::deflate(content, out);
 }
 
-/// What [`compress`] was given; none if these are not its bytes, or become more than a session can have.
+/// The content that [`compress`] was given. `None` if `bytes` are not its output, or the content is longer than any
+/// session's.
 pub(super) fn decompress(bytes: &[u8]) -> Option<Vec<u8>> {
     let (length, compressed) = bytes.split_first_chunk::<LENGTH_BYTES>()?;
     let length = usize::try_from(u32::from_le_bytes(*length)).ok()?;
@@ -56,9 +59,10 @@ mod tests {
             vec![0; 100_000],
             (0..100_000).map(noise).collect(),
             (0..9_999).map(|i| noise(i) & 3).collect(),
-            // Stored: its codes would take more than they save.
+            // This is stored as it is: its codes would take more bits than they save.
             (0..600).map(|i| noise(i) & 63).collect(),
-            // Numbers of bytes as Fibonacci's, whose code is longer than the format allows.
+            // The counts of the bytes grow as Fibonacci's numbers, so their Huffman code is longer than the format
+            // allows.
             (0..20_u8)
                 .flat_map(|i| vec![i; 1.618_f64.powi(i.into()) as usize])
                 .collect(),

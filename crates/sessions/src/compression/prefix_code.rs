@@ -1,10 +1,10 @@
 //! Prefix codes of DEFLATE: Huffman's, with a longest length, in canonical order (RFC 1951, section 3.2.2).
 
-/// The bits of a symbol in a leaf; those above are its count.
+/// Low bits of a leaf, which hold its symbol; the higher bits are the symbol's count.
 const SYMBOL_BITS: u32 = 9;
-/// The format has none that is longer.
+/// The longest code of the format, in bits.
 const MAX_LENGTH: usize = 15;
-/// Counts of 32 bits make no deeper tree: Fibonacci's numbers are the worst.
+/// A bound of the tree's depth for counts of 32 bits. Counts that grow as Fibonacci's numbers make the deepest tree.
 const MAX_DEPTH: usize = 48;
 
 /// The code of a symbol.
@@ -12,12 +12,12 @@ const MAX_DEPTH: usize = 48;
 pub(super) struct Code {
     /// The first bit lowest.
     pub bits: u16,
-    /// 0 for a symbol that does not occur.
+    /// In bits; 0 for a symbol that does not occur.
     pub length: u8,
 }
 
-/// The lengths of the codes of symbols that occur so many times (each below 2^23), none above `limit`; 0 where a count
-/// is.
+/// The lengths in bits of the codes of symbols that occur `counts` times (each below 2^23). No length is above `limit`;
+/// that of a symbol that does not occur is 0.
 pub(super) fn lengths<const N: usize>(counts: &[u32; N], limit: usize) -> [u8; N] {
     let occurs = |&(_, &count): &(u32, &u32)| count > 0;
     let mut leaves: Vec<u32> = (0..)
@@ -40,7 +40,7 @@ pub(super) fn lengths<const N: usize>(counts: &[u32; N], limit: usize) -> [u8; N
     lengths
 }
 
-/// How many leaves Huffman's tree has at each depth. The rarest leaf comes first.
+/// Counts in `leaves_at` how many leaves Huffman's tree has at each depth. `leaves` are sorted, the rarest first.
 fn count_depths(leaves: &[u32], leaves_at: &mut [usize; MAX_DEPTH]) {
     let n = leaves.len();
     if n < 2 {
@@ -81,7 +81,7 @@ fn count_depths(leaves: &[u32], leaves_at: &mut [usize; MAX_DEPTH]) {
     }
 }
 
-/// Shortens what is longer than `limit`, and lengthens others until it is a prefix code again.
+/// Shortens the codes that are longer than `limit`, and lengthens others until they are a prefix code again.
 fn limit_lengths(codes_of: &mut [usize; MAX_DEPTH], limit: usize) {
     codes_of[limit] += codes_of[limit + 1..].iter().sum::<usize>();
     codes_of[limit + 1..].fill(0);
@@ -91,7 +91,7 @@ fn limit_lengths(codes_of: &mut [usize; MAX_DEPTH], limit: usize) {
     while taken > room {
         let shorter = (1..limit).rfind(|&length| codes_of[length] > 0);
         let shorter = shorter.expect("2^limit codes have room, and no alphabet here has more");
-        // It becomes one bit longer, and one of the longest codes gets the place beside it.
+        // This code becomes one bit longer, and one of the longest codes becomes its sibling.
         codes_of[shorter] -= 1;
         codes_of[shorter + 1] += 2;
         codes_of[limit] -= 1;

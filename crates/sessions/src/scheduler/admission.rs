@@ -39,10 +39,10 @@ impl WorkPanicked {
 /// Why work has no outcome.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NoOutcome {
-    /// It was not begun: the client's requests wait too long for a worker.
+    /// The work was not begun: the client's requests wait too long for a worker.
     #[error("the client's requests wait too long")]
     Overload,
-    /// It panicked.
+    /// The work panicked.
     #[error(transparent)]
     Panicked(#[from] WorkPanicked),
 }
@@ -52,7 +52,7 @@ struct Unstarted<W>(Arc<Mutex<Option<W>>>);
 
 impl<W> Drop for Unstarted<W> {
     fn drop(&mut self) {
-        // It is dropped after the lock.
+        // The work is dropped after the lock is released.
         let _work = lock(&self.0).take();
     }
 }
@@ -66,9 +66,9 @@ pub struct Admission {
 }
 
 impl Admission {
-    /// At most `queue` requests at a time, and one of each client that has none there; at most `workers` quick ones and
-    /// as many slow ones of them at work. Where all requests of a client wait longer than `delay`, those that wait
-    /// twice as long are refused for newer ones; none at zero.
+    /// At most `queue` requests wait or work at a time, besides one of each client that has no other; of these at most
+    /// `workers` quick ones and as many slow ones are at work. Where all requests of a client wait longer than `delay`,
+    /// those that wait twice as long are refused for newer ones; at zero none is.
     ///
     /// # Errors
     /// The system gives no threads for the workers.
@@ -85,7 +85,8 @@ impl Admission {
         }
     }
 
-    /// Whether there is a place in the queue for a client now. It may be gone when it is asked for.
+    /// Whether there is a place in the queue for a client now. Another request may take it before
+    /// [`enter`](Self::enter) is called.
     ///
     /// # Errors
     /// There is none.
@@ -99,7 +100,7 @@ impl Admission {
     /// Takes a place in the queue for a client's request, which holds `held` until its work has ended.
     ///
     /// # Errors
-    /// All places are taken, and the client has one of them.
+    /// All places are taken that this client may have.
     pub fn enter(&self, flow: Flow, held: Reservation) -> Result<QueuePermit, QueueFull> {
         self.rejoin(Ticket::new(flow, held))
     }
@@ -113,14 +114,15 @@ impl Admission {
     /// Takes a place in the queue for a request that has left it.
     ///
     /// # Errors
-    /// All places are taken, and the client has one of them.
+    /// All places are taken that this client may have.
     pub fn rejoin(&self, request: Ticket) -> Result<QueuePermit, QueueFull> {
         let place = self.queue.take(request.flow()).ok_or(QueueFull)?;
         Ok(QueuePermit::new(request, place))
     }
 
-    /// Waits for a worker and runs `work` on its thread, with the turn that it may give up for a while. If the future
-    /// is dropped before a worker is free, the work is not done; afterwards it keeps its permits until it has ended.
+    /// Waits for a worker and runs `work` on its thread. Work may give up the worker for a while through its
+    /// [`WorkerSlot`]. If the future is dropped before a worker is free, the work is not done; if later, the work goes
+    /// on and keeps its permits until it has ended.
     ///
     /// # Errors
     /// The work panicked, or it waited too long for a worker.
@@ -132,7 +134,7 @@ impl Admission {
         let asked = queue.asked();
         let span = tracing::Span::current();
         let (send, outcome) = oneshot::channel();
-        // Where this future is dropped before a worker takes it, the work and its permits are dropped with it.
+        // If this future is dropped before a worker takes the work, the work and its permits are dropped with it.
         let unstarted = Unstarted(Arc::new(Mutex::new(Some((queue, work)))));
         let (taken, executor) = (unstarted.0.clone(), self.executor.clone());
         let start = move |mut turn: WorkerSlot| {
@@ -150,7 +152,7 @@ impl Admission {
                 }
                 Box::new(move || {
                     drop(turn);
-                    // It cannot be sent when the client has gone.
+                    // Nobody receives it if the client has gone.
                     let _ = send.send(outcome);
                 })
             });
@@ -158,12 +160,12 @@ impl Admission {
             Ok(())
         };
         self.workers.enter(asked, Box::new(start));
-        // All work that begins ends, and says how.
+        // Work that has begun always sends its outcome. So without one it was refused.
         let outcome = outcome.await.map_err(|_| NoOutcome::Overload)?;
         outcome.map_err(|panic| WorkPanicked::of(panic.as_ref()).into())
     }
 
-    /// Places free in the queue, for whoever comes.
+    /// Free places in the queue that any client may take.
     pub fn queue_places(&self) -> usize {
         self.queue.free()
     }
@@ -205,7 +207,7 @@ mod tests {
     async fn a_free_place_goes_to_the_request_that_waited_longest() {
         let admission = Admission::new(1, 1, Duration::ZERO).unwrap();
         let taken = enter(&admission).unwrap();
-        // Each client has one.
+        // Each client may have one place beyond the queue.
         let _spare = admission.enter_in_order(Flow(1), Box::new(())).await;
         let mut first = Box::pin(admission.enter_in_order(Flow(0), Box::new(())));
         let mut second = Box::pin(admission.enter_in_order(Flow(1), Box::new(())));
@@ -261,7 +263,7 @@ mod tests {
     #[tokio::test]
     async fn a_thread_goes_on_with_the_work_that_waits_for_its_worker() {
         let admission = Admission::new(9, 1, Duration::ZERO).unwrap();
-        // A thread that starts late would be the one that became idle last.
+        // Waits until all threads are idle: one that starts late would be the one that became idle last.
         while !format!("{:?}", admission.executor).starts_with("[Workers(9 idle)") {
             tokio::task::yield_now().await;
         }

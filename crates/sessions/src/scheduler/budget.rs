@@ -1,9 +1,9 @@
-//! What clients may hold together of something, and each client of it: bytes, places.
+//! Bounds on what all clients together, and each client alone, may hold of one thing: bytes of memory, places.
 //!
 //! A client may hold no more than is free (a dynamic threshold: Choudhury, Hahne 1998), and no more than its own
-//! maximum. So each further client finds half of what those before it left, and no number of greedy ones takes all. The
-//! networks that a client is in may hold no more than is free either, or than one client may where that is more: the
-//! addresses of one network do not add up to many shares.
+//! maximum. So each further greedy client gets half of what those before it left, and no number of them takes all. A
+//! network of clients is bounded too: its clients together may hold no more than is free, or than one client may where
+//! that is more. So many addresses of one network do not add up to many shares.
 //!
 //! A client may have parts, of which none holds more than it leaves of the client's budget.
 //!
@@ -13,7 +13,7 @@ use crate::sync::atomic::{AtomicUsize, Ordering};
 use bytes::Bytes;
 use std::sync::Arc;
 
-/// Something of which so many may be held at the same time. Clones are the same budget.
+/// How many of a thing may be held at the same time, and are held. Clones are the same budget.
 #[derive(Debug, Clone)]
 pub struct Budget(Arc<Inner>);
 
@@ -21,30 +21,30 @@ pub struct Budget(Arc<Inner>);
 struct Inner {
     most: usize,
     held: AtomicUsize,
-    /// Those of the networks that a client is in.
+    /// The budgets of the networks that a client is in.
     networks: Vec<Budget>,
-    /// The client's, where this is that of a part of it.
+    /// The client's budget, where this is the budget of a part of the client.
     whole: Option<Budget>,
 }
 
 /// Which budget has too little left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum BudgetFull {
-    /// That of all clients: it is used up, or this client holds as much as is free.
+    /// The budget of all clients: it is used up, or this client holds as much as is free.
     #[error("all clients together hold as much as they may")]
     All,
-    /// The client's own.
+    /// The client's own budget.
     #[error("the client holds as much as it may")]
     Client,
 }
 
 impl Budget {
-    /// So many.
+    /// A budget of `most`.
     pub fn new(most: usize) -> Self {
         Self::of_client(most, Vec::new())
     }
 
-    /// That of a client in these networks.
+    /// The budget of a client in these networks.
     pub fn of_client(most: usize, networks: Vec<Self>) -> Self {
         Self(Arc::new(Inner {
             most,
@@ -54,7 +54,7 @@ impl Budget {
         }))
     }
 
-    /// That of a part of this client: what it holds, the client holds.
+    /// The budget of a part of this client: what the part holds, the client holds too.
     pub fn part(&self) -> Self {
         Self(Arc::new(Inner {
             most: self.0.most,
@@ -74,14 +74,14 @@ impl Budget {
         self.0.held.load(Ordering::Acquire)
     }
 
-    /// Takes so many until the returned value is dropped; none if there are too few left.
+    /// Takes `count` until the returned value is dropped; `None` if too few are left.
     pub(crate) fn hold(&self, count: usize) -> Option<Charge> {
         let mut charge = Charge::new(self, &Self::new(usize::MAX));
         charge.grow(count).ok()?;
         Some(charge)
     }
 
-    /// Takes so many, where no more than `limit` are held then.
+    /// Takes `count`, if no more than `limit` are held then. Returns whether it did.
     fn take(&self, count: usize, limit: usize) -> bool {
         let limit = limit.min(self.0.most);
         let more = |held: usize| held.checked_add(count).filter(|held| *held <= limit);
@@ -97,7 +97,7 @@ impl Budget {
     }
 }
 
-/// What a client holds, of its own budget and of that of all clients. Given back when this is dropped.
+/// What a client holds of its own budget and of the budget of all clients. Given back when this is dropped.
 #[derive(Debug)]
 pub struct Charge {
     all: Budget,
@@ -106,7 +106,7 @@ pub struct Charge {
 }
 
 impl Charge {
-    /// Nothing yet, of the budgets of all clients and of this one.
+    /// A charge of nothing yet, to the budgets of all clients and of this client.
     pub fn new(all: &Budget, client: &Budget) -> Self {
         Self {
             all: all.clone(),
@@ -115,7 +115,7 @@ impl Charge {
         }
     }
 
-    /// Takes so many more.
+    /// Takes `count` more.
     ///
     /// # Errors
     /// One of the budgets has too few left. Nothing was taken.
@@ -126,7 +126,7 @@ impl Charge {
             return Err(BudgetFull::Client);
         }
         let whole = client.whole.as_ref().unwrap_or(&self.client);
-        // Whoever is alone may have what is left over.
+        // A client that alone holds anything may have all that is free.
         let is_alone = self.all.held() <= whole.held();
         let limit = if is_alone { usize::MAX } else { free };
         // A network has at least what one client may have.
@@ -147,7 +147,7 @@ impl Charge {
         Ok(())
     }
 
-    /// Gives some back, down to so many.
+    /// Gives back all above `count`.
     pub fn shrink(&mut self, count: usize) {
         let less = self.count.saturating_sub(count);
         self.count -= less;
@@ -164,8 +164,8 @@ impl Drop for Charge {
     }
 }
 
-/// Bytes with their charge. As [`Bytes`] they give it back when the last clone of them is dropped: an upload when the
-/// last worker is done with it, an answer when its client has taken it.
+/// Bytes with the charge for their memory. Converted to [`Bytes`], the last clone gives the charge back when it is
+/// dropped: that of an upload when the last worker is done with it, that of an answer when the client has received it.
 #[derive(Debug)]
 pub struct ChargedBytes<B> {
     bytes: B,
@@ -173,13 +173,13 @@ pub struct ChargedBytes<B> {
 }
 
 impl<B: AsRef<[u8]>> ChargedBytes<B> {
-    /// Bytes for which `charge` has been reserved. What is too much of it is given back at once.
+    /// Bytes for which `charge` has been reserved. What the charge has above their length is given back at once.
     pub fn new(bytes: B, mut charge: Charge) -> Self {
         charge.shrink(bytes.as_ref().len());
         Self::sharing(bytes, &Arc::new(charge))
     }
 
-    /// Bytes of several that are charged together.
+    /// Some of several byte strings that are charged together: the charge is given back when all are dropped.
     pub fn sharing(bytes: B, charge: &Arc<Charge>) -> Self {
         Self {
             bytes,

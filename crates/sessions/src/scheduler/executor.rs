@@ -10,41 +10,42 @@ use std::sync::Arc;
 use std::time::Duration;
 use std::{fmt, io};
 
-/// What runs work. Clones are the same.
+/// What runs work. Clones share the threads.
 #[derive(Clone)]
 pub struct Executor(Kind);
 
 #[derive(Clone)]
 enum Kind {
-    /// The threads of each class.
+    /// The threads for small and for large work.
     Threads(Arc<[Workers; 2]>),
     Given(Arc<dyn Fn(Work) + Send + Sync>),
 }
 
-/// The threads for so many workers of one class.
+/// How many threads `workers` workers of one class need: further ones for work that has begun and waits between two
+/// frames.
 pub fn threads_of(workers: usize) -> usize {
     workers + max_begun(workers)
 }
 
 impl Executor {
-    /// The threads of so many workers of each class.
+    /// Threads for `workers` workers of each class.
     ///
     /// # Errors
     /// The system gives no more threads.
     pub fn threads(workers: usize) -> io::Result<Self> {
-        // Of work on several frames, what has begun may wait between two of them.
+        // Work on several frames keeps its thread while it waits between two of them.
         let threads = |class: SizeClass| Workers::new(threads_of(workers), class.niceness());
         let threads = [threads(SizeClass::Small)?, threads(SizeClass::Large)?];
         Ok(Self(Kind::Threads(Arc::new(threads))))
     }
 
-    /// What runs each work when it likes, all on one thread. So that it does the same each time, its work counts as
-    /// taking no processor time, and never stops for other work.
+    /// Hands each piece of work to `start`, which runs it when it likes, all on one thread. So that each run of a
+    /// simulation is the same, work counts as taking no processor time, and never gives way to other work.
     pub fn on_one_thread(start: impl Fn(Work) + Send + Sync + 'static) -> Self {
         Self(Kind::Given(Arc::new(start)))
     }
 
-    /// Runs work, for which this class of workers has been given.
+    /// Runs work that has been given a worker of this class.
     pub(super) fn start(&self, class: SizeClass, work: Work) {
         match &self.0 {
             Kind::Threads(threads) => threads[class as usize].start(work),
@@ -75,7 +76,7 @@ impl fmt::Debug for Executor {
 pub(super) enum CpuClock {
     /// The processor time of the thread that asks.
     Thread,
-    /// Work takes none.
+    /// All work counts as taking none.
     Still,
 }
 
@@ -99,7 +100,7 @@ fn thread_cpu_time() -> Duration {
     Duration::new(seconds, nanoseconds)
 }
 
-/// Elsewhere the time of day stands in for it.
+/// On other systems the time that has passed stands in for the processor time.
 #[cfg(all(not(unix), not(feature = "shuttle")))]
 fn thread_cpu_time() -> Duration {
     use crate::clock::{self, Instant};
@@ -108,7 +109,7 @@ fn thread_cpu_time() -> Duration {
     START.get_or_init(clock::now).elapsed()
 }
 
-/// Where a test chooses the order of threads, it chooses what they take too: some milliseconds between two questions.
+/// Where a test chooses the order of threads, it also draws their processor time: 0 to 7 ms between two calls.
 #[cfg(feature = "shuttle")]
 fn thread_cpu_time() -> Duration {
     use shuttle::rand::{Rng, thread_rng};
@@ -120,7 +121,7 @@ fn thread_cpu_time() -> Duration {
     Duration::from_millis(TAKEN.get())
 }
 
-/// Work of a request, and what is to be done once its thread can be given the next. Neither may panic.
+/// Work of a request. It returns what is to be done once its thread can be given the next work. Neither may panic.
 pub type Work = Box<dyn FnOnce() -> AfterWork + Send>;
 /// What is to be done after [`Work`], on its thread.
 pub type AfterWork = Box<dyn FnOnce()>;
@@ -142,8 +143,8 @@ struct State {
 }
 
 impl Workers {
-    /// So many threads, whose priority is lower by `niceness` than that of this thread. They start now: one that a
-    /// worker started would have that worker's priority.
+    /// `threads` threads, whose priority is lower by `niceness` than that of this thread. All start now, since a thread
+    /// has the priority of the one that starts it.
     ///
     /// # Errors
     /// The system gives no more threads.
@@ -188,7 +189,8 @@ impl fmt::Debug for Workers {
 }
 
 impl Shared {
-    /// The main loop of a thread. It is idle before what comes after a job, so a job that this starts goes on here.
+    /// The main loop of a thread. It counts as idle before it does what comes after a job, so a job that this starts is
+    /// done on the same thread.
     fn serve(&self, niceness: i32) {
         lower_priority(niceness);
         let slot = Arc::new(ParkingSlot::default());
@@ -217,10 +219,10 @@ impl Shared {
     }
 }
 
-/// Lowers the priority of this thread. Elsewhere than in Linux it would be that of the process.
+/// Lowers the priority of this thread. On other systems than Linux, `nice` would lower that of the process.
 #[cfg(target_os = "linux")]
 fn lower_priority(niceness: i32) {
-    // With the feature all threads are the test's.
+    // With the feature `shuttle` all threads run on the test's own.
     if niceness > 0
         && cfg!(not(feature = "shuttle"))
         && let Err(error) = rustix::process::nice(niceness)
@@ -232,7 +234,7 @@ fn lower_priority(niceness: i32) {
 #[cfg(not(target_os = "linux"))]
 fn lower_priority(_: i32) {}
 
-/// Where one idle thread waits for a job, or for None, which tells it to end.
+/// Where one idle thread waits for a job, or for `None`, which tells it to end.
 #[derive(Default)]
 struct ParkingSlot {
     given: Mutex<Option<Option<Work>>>,

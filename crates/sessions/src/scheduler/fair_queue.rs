@@ -1,4 +1,4 @@
-//! Who gets the next free worker: the client that has one least, and among those the one that used least time.
+//! Who gets the next free worker: the client with the fewest workers, and among those the one that used the least time.
 //!
 //! This is start-time fair queueing (Goyal, Vin, Cheng 1996) with measured instead of announced lengths: a client's
 //! requests wait in a flow of their own, in order of arrival (where they wait too long, [the newest goes
@@ -6,11 +6,12 @@
 //! up a small claim, so a client that sends less than its share hardly waits for those that send all they can.
 //!
 //! Clients whose work is slow have workers of their own ([`SizeClass`]), so that the frames of the others need not wait
-//! until a slow one is done. How slow it was is remembered for some time, and what is known of work before it begins
-//! counts like what was measured.
+//! until a slow one is done. The longest work of a client is remembered for some time. A lower bound of the work's time
+//! that is known before it begins counts like a measured one.
 //!
 //! Work on several frames gives its worker up between two of them when another flow has the better claim. Its thread
-//! waits meanwhile, so there are more threads than workers, and a flow begins no second one of these while others do.
+//! waits meanwhile, so there are more threads than workers, and the number of such requests that have begun is bounded
+//! ([`max_begun`](super::flows::max_begun)).
 
 use super::executor::{AfterWork, CpuClock, Executor};
 use super::flows::{Flow, Flows, Held, Job, Next, Request, SizeClass};
@@ -23,12 +24,12 @@ use tokio::sync::oneshot;
 /// Starts a request's work, or gives the turn back where its client has gone.
 type Give = Box<dyn FnOnce(WorkerSlot) -> Result<(), WorkerSlot> + Send>;
 
-/// The queue. Clones are the same one.
+/// The queue. Clones share it.
 #[derive(Clone)]
 pub(super) struct FairQueue {
     pub(super) flows: Arc<Mutex<Flows<Give>>>,
     cpu: CpuClock,
-    /// What runs the work; none where a test does.
+    /// What runs the work; `None` in tests that take the workers themselves.
     executor: Option<Executor>,
 }
 
@@ -37,31 +38,32 @@ pub(super) struct FairQueue {
 pub(super) struct Asked {
     pub(super) flow: Flow,
     pub(super) length: Job,
-    /// About what its longest part takes, as far as that is known.
+    /// A lower bound of the processor time of its longest part; zero where none is known.
     pub(super) expected: Duration,
-    /// Whether it is refused rather than answered late.
+    /// Whether the request may be refused where it waits too long.
     pub(super) may_refuse: bool,
 }
 
 /// A worker, given back when this is dropped.
 #[derive(Debug)]
 pub struct WorkerSlot {
-    /// None once the worker was handed on.
+    /// `None` once the worker was given to another request.
     queue: Option<FairQueue>,
     cpu: CpuClock,
     flow: Flow,
     length: Job,
     class: SizeClass,
-    /// Processor time of the worker's thread when work began, if it has.
+    /// Processor time of the worker's thread when the work began; `None` before.
     began: Option<Duration>,
-    /// The same when others could have had a turn last.
+    /// Processor time of the thread at the last moment at which others could have had a turn.
     checked: Duration,
     /// The longest time between two such moments.
     longest: Duration,
 }
 
 impl FairQueue {
-    /// For so many workers. `delay` is the target of what a flow's requests wait; zero where they may wait for ever.
+    /// A queue for `workers` workers of each class. `delay` is the target of how long a flow's requests wait; zero
+    /// where they may wait for ever.
     pub(super) fn new(workers: usize, delay: Duration) -> Self {
         Self {
             flows: Arc::new(Mutex::new(Flows::new(workers, delay))),
@@ -79,8 +81,8 @@ impl FairQueue {
         }
     }
 
-    /// Calls `give` once there is a worker: now, or on the thread that gives its worker up. It is dropped where the
-    /// request has waited too long.
+    /// Calls `give` once there is a worker: at once, or later on the thread that gives its worker up. `give` is dropped
+    /// without a call where the request has waited too long.
     pub(super) fn enter(&self, asked: Asked, give: Give) {
         let Asked {
             flow,
@@ -96,16 +98,16 @@ impl FairQueue {
             let Some(worker) = state.worker_for(&state.flows[&flow], length) else {
                 return state.wait(flow, length, give, since);
             };
-            // It has not waited, which is noted.
+            // This request has not waited, which controlled delay has to know.
             state.order(flow, since);
             state.serve(flow, length, worker);
             worker
         };
-        // What is given back is handed on as it is dropped.
+        // Where the client has gone, `give` returns the slot; dropping it gives the worker to the next request.
         drop(give(self.turn(flow, length, worker)));
     }
 
-    /// Asks for a worker; what is returned gets it.
+    /// Asks for a worker, which comes through the returned channel.
     #[cfg(test)]
     pub(super) fn ask(&self, flow: Flow, length: Job) -> oneshot::Receiver<WorkerSlot> {
         let (give, given) = oneshot::channel();
@@ -124,7 +126,8 @@ impl FairQueue {
         lock(&self.flows).running()
     }
 
-    /// Gives the worker of `flow` to a flow with a better claim, if there is one. Returns what gets a worker again.
+    /// Gives the worker of `flow` to a flow with a better claim, if there is one. Returns the channel through which the
+    /// work gets a worker again.
     fn yield_to_others(
         &self,
         flow: Flow,
@@ -173,7 +176,7 @@ impl FairQueue {
         }
     }
 
-    /// Takes the worker back that `flow` had, and gives the workers that are free now to the next requests.
+    /// Takes back the worker that `flow` had, and gives all free workers to the next requests.
     fn hand_on(&self, flow: Flow, class: SizeClass, held: Held) {
         let mut ended = Some((flow, class, held));
         loop {
@@ -185,7 +188,7 @@ impl FairQueue {
                 match state.next() {
                     Some(Next::Served(flow, length, class, give)) => (flow, length, class, give),
                     Some(Next::Refused(give)) => {
-                        // What waits for it wakes up.
+                        // Dropping it wakes up the refused request. The lock must be free then.
                         drop(state);
                         drop(give);
                         continue;
@@ -194,7 +197,7 @@ impl FairQueue {
                 }
             };
             if let Err(mut refused) = give(self.turn(flow, length, class)) {
-                // Its client has gone. The worker is still to be given away.
+                // The request's client has gone. The loop gives the worker away again.
                 refused.queue = None;
                 let ends = length != Job::Single;
                 let held = Held {
@@ -214,7 +217,7 @@ impl fmt::Debug for FairQueue {
 }
 
 impl WorkerSlot {
-    /// Which workers' turn it is.
+    /// The class of the worker.
     pub(super) fn class(&self) -> SizeClass {
         self.class
     }
@@ -230,7 +233,7 @@ impl WorkerSlot {
         (self.began, self.checked) = (Some(now), now);
     }
 
-    /// How the worker was used so far. `ends` says whether work on several frames ends.
+    /// How the worker was used so far. `ends` says whether work on several frames has ended.
     fn held(&mut self, ends: bool) -> Held {
         let Some(began) = self.began else {
             return Held {
@@ -248,8 +251,8 @@ impl WorkerSlot {
         }
     }
 
-    /// Has an idle worker do `work` for the same request, over and over while it says that there is more and nobody
-    /// else wants a worker. False where none is idle, or all work has one thread.
+    /// Has an idle worker call `work` for the same request, again and again while it returns true and nobody else wants
+    /// a worker. False where no worker is idle, or all work runs on one thread.
     pub(super) fn share(&self, work: impl Fn() -> bool + Send + 'static) -> bool {
         let (Some(queue), CpuClock::Thread) = (&self.queue, self.cpu) else {
             return false;
@@ -266,7 +269,7 @@ impl WorkerSlot {
             drop(work);
             Box::new(move || drop(borrowed))
         };
-        // Of the request's own priority, for it waits for this.
+        // On threads with the priority of the request's own, which waits for this work.
         executor.start(self.class, Box::new(work));
         true
     }
@@ -280,14 +283,14 @@ impl WorkerSlot {
         })
     }
 
-    /// Lets a request of another flow go first, where that has the better claim. Blocks this thread until there is a
-    /// worker again; it must not be one that runs tasks.
+    /// Lets a request of another flow go first, if that flow has the better claim. Blocks this thread until there is a
+    /// worker again, so it must not be a thread of the async runtime.
     pub(super) fn yield_to_others(&mut self) {
-        // On the one thread of all work nobody could give the worker back.
+        // If all work runs on one thread, nobody could give the worker back.
         if self.cpu == CpuClock::Still {
             return;
         }
-        // Work on one frame ends sooner than it would come back.
+        // Work on one frame ends sooner than its turn would come again.
         let (Some(queue), Job::Batch | Job::ResumedBatch(_)) = (self.queue.clone(), self.length)
         else {
             return;
@@ -296,7 +299,7 @@ impl WorkerSlot {
         let Some(given) = queue.yield_to_others(self.flow, self.class, held) else {
             return;
         };
-        // Its worker was handed on.
+        // The worker was given away.
         self.queue = None;
         let turn = sync::wait_for(given);
         *self = turn.expect("every flow with requests is served in the end");
@@ -364,7 +367,7 @@ mod tests {
         let queue = FairQueue::new(1, Duration::ZERO);
         let mut short = given(&mut queue.ask(Flow(1), Job::Single));
         let mut other = queue.ask(Flow(2), Job::Batch);
-        // It would wait for ever for the other, which ends on this thread.
+        // If it gave way, it would wait for ever: the other's work ends on this thread.
         short.yield_to_others();
         drop(short);
         drop(given(&mut other));
@@ -375,7 +378,7 @@ mod tests {
     fn quick_work_never_waits_behind_slow_work() {
         let queue = FairQueue::new(1, Duration::ZERO);
         let mut first = given(&mut queue.ask(Flow(1), Job::Single));
-        // It took as long as a large picture takes.
+        // The work took as long as that of a large picture.
         first.queue = None;
         let long = Duration::from_millis(50);
         let held = Held {

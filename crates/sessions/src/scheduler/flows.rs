@@ -5,17 +5,18 @@ use crate::clock::{self, Instant};
 use std::collections::{HashMap, VecDeque};
 use std::time::Duration;
 
-/// Work that takes more processor time without a break makes its flow a slow one. It is half of the time between two
-/// frames of a camera, some ten times what one takes, and more than one that learns takes in a build for tests.
+/// Work that takes more processor time than this without a break makes its flow a slow one. It is about half of the
+/// time between two frames of a camera, some ten times what a frame takes, and more than what a frame with learning
+/// takes in a test build.
 const SLOW: Duration = Duration::from_millis(20);
 /// The memory of the longest work fades by half in this time, whatever else the client sends meanwhile.
 const HALF_LIFE: Duration = Duration::from_secs(5);
-/// Flows above which those without work, debt and slow work are forgotten.
+/// Where there are more flows than this, those without requests, debt and remembered slow work are forgotten.
 const MAX_IDLE_FLOWS: usize = 1024;
 /// Least number of requests with several frames that may have begun, whatever the number of workers.
 const MIN_BEGUN: usize = if cfg!(feature = "shuttle") { 2 } else { 8 };
 
-/// Whose requests wait for each other only.
+/// A client to the scheduler: requests of one flow have their turns together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Flow(pub u64);
 
@@ -24,7 +25,7 @@ pub struct Flow(pub u64);
 pub(super) struct Flows<G> {
     /// Workers of each class.
     workers: usize,
-    /// Those at work, by their class.
+    /// Workers at work, by their class.
     running: [usize; 2],
     /// Requests with several frames that have begun and not ended.
     pub(super) begun: usize,
@@ -33,7 +34,7 @@ pub(super) struct Flows<G> {
     pub(super) flows: HashMap<Flow, Waiting<G>>,
     /// The target of the delay of a flow's requests; zero where they may wait for ever.
     delay: Duration,
-    /// How often a request became the first of its flow.
+    /// Counts the moments at which a flow got a new first request.
     firsts: u64,
     started: Instant,
     /// Time that a test lets pass.
@@ -41,18 +42,19 @@ pub(super) struct Flows<G> {
     pub(super) passed: Duration,
 }
 
-/// A flow.
+/// A flow: its use of workers, and the requests that wait.
 #[derive(Debug)]
 pub(super) struct Waiting<G> {
     pub(super) used: Duration,
     pub(super) running: usize,
-    /// Of these, those that have a worker for small work.
+    /// How many of the flow's workers are those for small work.
     quick: usize,
     /// Requests with several frames that have begun and not ended.
     begun: usize,
     pub(super) requests: VecDeque<Request<G>>,
     delay: ControlledDelay,
-    /// Orders flows that have used the same time: those that start level are many.
+    /// When the flow got its first request, by [`Flows::firsts`]. Orders flows that have used the same time, as many
+    /// have that start level.
     since: u64,
     class: SizeClass,
     longest: Faded,
@@ -63,20 +65,20 @@ pub(super) struct Waiting<G> {
 pub(super) struct Request<G> {
     pub(super) length: Job,
     pub(super) give: G,
-    /// When it came, where it may be refused.
+    /// When the request came; `None` where it may not be refused.
     pub(super) since: Option<Duration>,
 }
 
 /// What becomes of the request whose turn it is.
 #[derive(Debug)]
 pub(super) enum Next<G> {
-    /// It has a worker of this class.
+    /// It gets a worker of this class.
     Served(Flow, Job, SizeClass, G),
     /// It has waited too long.
     Refused(G),
 }
 
-/// The longest time that a worker was held without a break, less what has faded since.
+/// The longest time that a flow held a worker without a break. The value halves every [`HALF_LIFE`].
 #[derive(Debug, Clone, Copy, Default)]
 struct Faded {
     value: Duration,
@@ -84,7 +86,7 @@ struct Faded {
 }
 
 impl Faded {
-    /// What is left of it.
+    /// The value at `now`.
     fn at(self, now: Duration) -> Duration {
         let half_lives = now.saturating_sub(self.at).div_duration_f64(HALF_LIFE);
         self.value.mul_f64((-half_lives).exp2())
@@ -102,7 +104,7 @@ pub(super) enum SizeClass {
 /// How much work a request is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Job {
-    /// One frame, or less.
+    /// One frame, or work without a frame.
     Single,
     /// Several frames.
     Batch,
@@ -110,11 +112,12 @@ pub(super) enum Job {
     ResumedBatch(SizeClass),
 }
 
-/// How good a flow's claim to a worker is; the least is the best. A place that is only borrowed comes last.
+/// How good a flow's claim to a worker is, the least being the best: whether the worker would be borrowed from the
+/// other class, how many workers the flow has, and the time that it has used.
 pub(super) type Claim = (bool, usize, Duration);
 
 impl SizeClass {
-    /// By how much lower the priority of its threads is: slow work gets a tenth of a core that quick work wants too.
+    /// The niceness of its threads. At 10, slow work gets about a tenth of a core that quick work wants too.
     pub(super) fn niceness(self) -> i32 {
         match self {
             Self::Small => 0,
@@ -132,7 +135,7 @@ impl SizeClass {
         }
     }
 
-    /// That of a flow whose longest work took this time.
+    /// The class of a flow whose longest work took this time.
     fn of(longest: Duration) -> Self {
         match longest > SLOW {
             true => Self::Large,
@@ -148,7 +151,7 @@ pub(super) fn max_begun(workers: usize) -> usize {
 }
 
 impl<G> Flows<G> {
-    /// For so many workers of each class, and this target of the delay.
+    /// No flows yet, for `workers` workers of each class and this target of the delay.
     pub(super) fn new(workers: usize, delay: Duration) -> Self {
         Self {
             workers,
@@ -169,7 +172,7 @@ impl<G> Flows<G> {
     }
 
     pub(super) fn time(&self) -> Duration {
-        // Where a test chooses the order of threads, time passes as it says.
+        // Where a test chooses the order of threads, time passes only by `passed`.
         let elapsed = match cfg!(feature = "shuttle") {
             true => Duration::ZERO,
             false => self.started.elapsed(),
@@ -180,8 +183,8 @@ impl<G> Flows<G> {
         elapsed
     }
 
-    /// The flow, to which a request comes whose work takes about `expected`. Where no other of its requests waits, it
-    /// starts no further behind the others than the claim that it may save up.
+    /// The flow, to which a request comes whose work takes at least `expected`. Where none of its requests waits, its
+    /// used time is raised to the virtual time less the claim that a flow may save up.
     pub(super) fn enter(&mut self, flow: Flow, expected: Duration) -> &mut Waiting<G> {
         self.note(flow, expected);
         let waiting = self.flows.entry(flow).or_default();
@@ -195,7 +198,7 @@ impl<G> Flows<G> {
         waiting
     }
 
-    /// A request of the flow waits, from now on where it may be refused.
+    /// Adds a request to those that wait. `since` is now, or `None` where the request may not be refused.
     pub(super) fn wait(&mut self, flow: Flow, length: Job, give: G, since: Option<Duration>) {
         let request = Request {
             length,
@@ -206,8 +209,8 @@ impl<G> Flows<G> {
         waiting.requests.push_back(request);
     }
 
-    /// Which request of a flow is next, whose oldest came at `since`, if that may be refused. Slow work may wait
-    /// longer: as long as it takes itself.
+    /// Which request of a flow is next. `since` is when the oldest came, where it may be refused. The target of a flow
+    /// with slow work is at least as long as that work.
     pub(super) fn order(&mut self, flow: Flow, since: Option<Duration>) -> Order {
         let now = self.time();
         let waiting = self.flows.get_mut(&flow);
@@ -220,8 +223,8 @@ impl<G> Flows<G> {
         waiting.delay.order((waited, is_alone), now, target)
     }
 
-    /// Notes work of a flow that took so long without a break, or will. Flows of another class have other times, so one
-    /// that changes its class starts level with them.
+    /// Notes work of a flow that took, or will take, this time without a break. Each class has a virtual time of its
+    /// own, so a flow that changes its class starts level with that of its new class.
     fn note(&mut self, flow: Flow, longest: Duration) {
         let at = self.time();
         let waiting = self.flows.entry(flow).or_default();
@@ -234,15 +237,17 @@ impl<G> Flows<G> {
         }
     }
 
-    /// Whether such a request need not wait for another one with several frames to end. A flow without one may always
-    /// begin one, as far as there are threads; more may begin as long as there are no more than workers.
+    /// Whether a request of this length may begin. Only one with several frames may have to wait until another such
+    /// ends. A flow that has begun none may begin one as long as there are threads; a further one only while fewer have
+    /// begun than there are workers.
     fn has_place(&self, waiting: &Waiting<G>, length: Job) -> bool {
         let is_first = waiting.begun == 0 && self.begun < max_begun(self.workers);
         length != Job::Batch || is_first || self.begun < self.workers
     }
 
-    /// Which worker a request of a flow may have now. A flow has one worker for small work, so that no client has all
-    /// of them with work that turns out to be slow; the rest of its work borrows the time that nobody else uses.
+    /// Which worker a request of a flow may have now. A flow has at most one worker for small work, so that no client
+    /// takes all of these with work that turns out to be slow. Its other requests borrow workers for large work while
+    /// fewer work in all than there are workers of one class.
     pub(super) fn worker_for(&self, waiting: &Waiting<G>, length: Job) -> Option<SizeClass> {
         let [small, large] = self.running.map(|running| running < self.workers);
         let small = small && waiting.quick == 0;
@@ -263,7 +268,7 @@ impl<G> Flows<G> {
         Some((worker != waiting.class, waiting.running, waiting.used))
     }
 
-    /// Whether work of both classes has more threads than there are workers of one.
+    /// Whether more workers of both classes together are at work than there are of one class.
     pub(super) fn is_crowded(&self) -> bool {
         self.running() > self.workers
     }
@@ -347,12 +352,12 @@ impl<G> Flows<G> {
     }
 }
 
-/// How a flow had a worker.
+/// How a flow used a worker.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Held {
     /// Processor time of its work.
     pub(super) time: Duration,
-    /// The longest part of it in which it gave nobody else a turn.
+    /// The longest part of this time in which the work gave nobody else a turn.
     pub(super) longest: Duration,
     /// Whether work on several frames has ended.
     pub(super) ends: bool,
@@ -398,7 +403,7 @@ mod tests {
     fn slow_work_is_remembered_in_time_and_no_number_of_quick_works_hides_it() {
         let mut flows = Flows::<()>::new(1, Duration::ZERO);
         assert_eq!(work(&mut flows, 1, 1_000), SizeClass::Small);
-        // Forty works of a fifth of a millisecond once made the flow quick again.
+        // A flow stays slow however many quick works follow.
         assert!((0..1_000).all(|_| work(&mut flows, 1, 0) == SizeClass::Large));
         flows.passed += 4 * HALF_LIFE;
         assert_eq!(work(&mut flows, 1, 0), SizeClass::Large);
@@ -429,12 +434,12 @@ mod tests {
         }
         let (quick, borrowed) = (Some(SizeClass::Small), Some(SizeClass::Large));
         assert_eq!(workers, [quick, borrowed, borrowed, None]);
-        // Another one has a quick worker at once.
+        // Another flow gets a quick worker at once.
         flows.enter(Flow(2), Duration::ZERO);
         let worker = flows.worker_for(&flows.flows[&Flow(2)], Job::Single);
         assert_eq!(worker, quick);
         flows.serve(Flow(2), Job::Single, SizeClass::Small);
-        // What was borrowed is given back to work that belongs there first.
+        // A borrowed worker that is given back goes first to work of its own class.
         ask(&mut flows, 1);
         flows.enter(Flow(3), Duration::from_secs(1));
         ask(&mut flows, 3);
@@ -451,7 +456,7 @@ mod tests {
         };
         for _ in 0..2 {
             assert!(begin(&mut flows, 1));
-            // Its worker is given up between two frames.
+            // The batch gives its worker up between two frames.
             flows.serve(Flow(1), Job::Batch, SizeClass::Large);
             flows.release(Flow(1), SizeClass::Large, Held::default());
         }
@@ -472,7 +477,7 @@ mod tests {
         flows.enter(Flow(2), Duration::ZERO);
         flows.serve(Flow(2), Job::Single, SizeClass::Small);
         work(&mut flows, 3, 1_000);
-        // It has used more than any that was served.
+        // Flow 4 has used more than the virtual time.
         work(&mut flows, 4, 15);
         work(&mut flows, 4, 15);
         flows.forget_idle_flows();
@@ -561,7 +566,7 @@ mod tests {
         let (mut refused, mut waited) = (Vec::new(), Vec::new());
         for turn in 0..400 {
             flows.passed += TURN;
-            // Of one twice as many come as there is time for, of the other few.
+            // Flow 1 sends twice as many requests as there is time for, flow 2 few.
             let other = (turn % 4 == 0).then_some(2);
             for flow in [1, 1].into_iter().chain(other) {
                 flows.enter(Flow(flow), Duration::ZERO);

@@ -1,7 +1,8 @@
 //! The queue, the workers and the budgets in many orders of their threads: `cargo test --features shuttle --lib
 //! interleavings`.
 //!
-//! An order in which a thread waits for ever fails as a deadlock. So each test says too that all workers' threads end.
+//! An order in which a thread waits for ever fails as a deadlock. So each test also checks that all threads of workers
+//! end.
 
 use super::admission::{Admission, NoOutcome};
 use super::budget::{Budget, Charge};
@@ -22,21 +23,21 @@ use tokio::sync::Notify;
 
 const LONG: Duration = Duration::from_secs(600);
 
-/// Counts across the orders of a test. No thread loses its turn by it.
+/// Counts across the orders of a test. It is an atomic of the system, so that counting is no step of an order.
 type Seen = Arc<std::sync::atomic::AtomicUsize>;
 
 fn note(seen: &Seen) {
     seen.fetch_add(1, Ordering::Relaxed);
 }
 
-/// Something happened in one of the orders at least: otherwise the test says nothing about it.
+/// Checks that `what` happened in at least one of the orders: otherwise the test would say nothing about it.
 fn assert_happened(seen: &Seen, what: &str) {
     let times = seen.load(Ordering::Relaxed);
     println!("{what}: {times} times");
     assert!(times > 0, "in no order: {what}");
 }
 
-/// Works that have a worker of each class, of which there are `most`.
+/// How many works have a worker of each class, of which there are `most`.
 struct AtWork {
     most: usize,
     now: [AtomicUsize; 2],
@@ -58,7 +59,7 @@ impl AtWork {
     }
 }
 
-/// Nothing of a queue of so many places is in use, once what has begun has ended.
+/// Checks that nothing of a queue of `places` places is in use, once the work that has begun has ended.
 fn assert_idle(admission: &Admission, places: usize) {
     while admission.busy_workers() > 0 {
         thread::yield_now();
@@ -291,7 +292,7 @@ fn every_job_runs_once_and_then_the_threads_end() {
         });
         drop(workers);
         join(threads);
-        // Their threads end once nothing waits: what they had of the jobs is dropped.
+        // The threads end once nothing waits, and drop their jobs with their clones of `runs`.
         while Arc::strong_count(&runs) > 1 {
             thread::yield_now();
         }

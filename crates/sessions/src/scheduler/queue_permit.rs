@@ -1,4 +1,4 @@
-//! A request's place in the queue, and what it is to the workers.
+//! A request's place in the queue, and what it asks of the workers.
 //!
 //! A client that has no place always gets one, however many the others have taken: there are as many places again for
 //! that. So some clients with all the requests that they may have in flight do not close the service to the others.
@@ -31,7 +31,7 @@ pub(super) struct Place {
 }
 
 impl Places {
-    /// So many, and as many for clients that have none.
+    /// `count` places, and as many spare ones for clients that have none.
     pub(super) fn new(count: usize) -> Arc<Self> {
         Arc::new(Self {
             queue: Arc::new(Semaphore::new(count)),
@@ -104,7 +104,7 @@ impl Drop for Place {
 }
 
 /// Least processor time of decoding a picture, for each of its pixels and for each byte of its file. Most pictures take
-/// a few times as much: those that are surely slow are known before they begin.
+/// a few times as much. The bound tells before the work begins which pictures are surely slow.
 const NANOS_PER_PIXEL: u64 = 4;
 const NANOS_PER_BYTE: u64 = 8;
 
@@ -114,12 +114,13 @@ pub type Reservation = Box<dyn Any + Send + Sync>;
 /// A place in the queue, given back when the last clone is dropped.
 #[derive(Debug, Clone)]
 pub struct QueuePermit {
-    // The place is free before what is held.
+    // Fields are dropped in order: the place is free before what the request holds.
     _place: Arc<Place>,
     request: Ticket,
 }
 
-/// A request without a place in the queue: it has not come there, or waits for something else than a worker.
+/// A request without a place in the queue: it has not entered yet, or has left to wait for something else than a
+/// worker.
 #[derive(Debug, Clone)]
 pub struct Ticket {
     flow: Flow,
@@ -145,7 +146,7 @@ impl Ticket {
         }
     }
 
-    /// Whose turn the request's work is done in.
+    /// The client's flow, in whose turns the work is done.
     pub(super) fn flow(&self) -> Flow {
         self.flow
     }
@@ -160,7 +161,7 @@ impl QueuePermit {
         }
     }
 
-    /// What the request asks of the workers. Work on several frames may wait: others go between.
+    /// What the request asks of the workers. Work on several frames is never refused for its wait.
     pub(super) fn asked(&self) -> Asked {
         let request = &self.request;
         Asked {
@@ -171,14 +172,14 @@ impl QueuePermit {
         }
     }
 
-    /// For work that cannot grow while it waits, as that of a client which sends no more before it has an answer, or of
-    /// a request with several frames: it waits for a worker, however long that takes.
+    /// Lets the request wait for a worker however long that takes. For clients that send nothing more before they have
+    /// an answer, and for requests with several frames: their queues do not grow while they wait.
     pub fn waiting(mut self) -> Self {
         self.request.may_refuse = false;
         self
     }
 
-    /// For work on frames of at most so many pixels, whose files have at most so many bytes.
+    /// For work on frames of at most `pixels` pixels, whose files have at most `bytes` bytes.
     pub fn for_size(mut self, pixels: u64, bytes: usize) -> Self {
         let nanos = pixels.saturating_mul(NANOS_PER_PIXEL);
         let nanos = nanos.max((bytes as u64).saturating_mul(NANOS_PER_BYTE));
@@ -186,18 +187,18 @@ impl QueuePermit {
         self
     }
 
-    /// For work that surely takes so much processor time without a break.
+    /// For work that takes at least this much processor time without a break.
     pub fn for_time(mut self, least: Duration) -> Self {
         self.request.expected = least;
         self
     }
 
-    /// Whose turn the request's work is done in.
+    /// The client's flow, in whose turns the work is done.
     pub fn flow(&self) -> Flow {
         self.request.flow
     }
 
-    /// For work on so many frames, which gives way to shorter work between two of them.
+    /// For work on `count` frames. Work on several gives way to other clients' work between two of them.
     pub fn for_frames(mut self, count: usize) -> Self {
         self.request.length = match count {
             0 | 1 => Job::Single,
@@ -206,13 +207,13 @@ impl QueuePermit {
         self
     }
 
-    /// The request may take the processor time of so many requests.
+    /// Lets the request take the processor time that `requests` requests may take.
     pub fn with_cpu_of(mut self, requests: u32) -> Self {
         self.request.cpu_share = requests;
         self
     }
 
-    /// Of how many requests it may take the processor time.
+    /// The number of requests whose processor time this one may take.
     pub fn cpu_share(&self) -> u32 {
         self.request.cpu_share
     }
@@ -222,7 +223,8 @@ impl QueuePermit {
         &self.request.spent
     }
 
-    /// Gives the place back, as far as no work of the request has it, and keeps what the request holds.
+    /// Gives this clone of the place back; the place is free once no work of the request has another. The ticket keeps
+    /// what the request holds.
     pub fn yield_place(self) -> Ticket {
         self.request
     }
@@ -243,7 +245,7 @@ mod tests {
         let other = places.take(Flow(9)).unwrap();
         assert!(places.take(Flow(9)).is_none(), "it has one");
         assert_eq!((places.free(), places.len()), (0, 5));
-        // Those places are bounded, too.
+        // The spare places are bounded, too.
         held.extend((10..13).map(|flow| places.take(Flow(flow)).unwrap()));
         assert!(places.take(Flow(13)).is_none() && !places.has_place(Flow(13)));
         drop((other, held));

@@ -1,7 +1,7 @@
 //! The parts of one request's work, side by side: on the thread that has it, and on workers that are idle.
 //!
-//! Each thread takes the next part until none is left. So a worker that comes late, or has to go, delays no part but
-//! the one that it is at.
+//! Each thread takes the next part until none is left. So a thread that comes late, or has to leave, delays no part but
+//! the one that it works on.
 
 use super::executor::CpuClock;
 use crate::sync::{Condvar, Mutex, PoisonError, lock};
@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::Duration;
 
-/// What a part has become, and where it was done the result and the processor time.
+/// A part after its step, with the step's result and processor time; a part that was not begun has none.
 pub(super) type Outcome<T, R> = (T, Option<(R, Duration)>);
 
 /// The parts, for all threads that work on them.
@@ -24,14 +24,14 @@ pub(super) struct Parts<T, R, F> {
 
 struct State<T, R> {
     waiting: VecDeque<(usize, T)>,
-    /// How many parts threads are at.
+    /// How many parts are being worked on.
     begun: usize,
     done: Vec<(usize, Outcome<T, R>)>,
     panic: Option<Box<dyn Any + Send>>,
 }
 
 impl<T, R, F: Fn(&mut T) -> R> Parts<T, R, F> {
-    /// To each of `parts` `step` is to be done; `cpu` measures it.
+    /// `step` is to be done to each of `parts`; `cpu` measures its processor time.
     pub(super) fn new(parts: Vec<T>, step: F, cpu: CpuClock) -> Self {
         let state = State {
             done: Vec::with_capacity(parts.len()),
@@ -47,7 +47,7 @@ impl<T, R, F: Fn(&mut T) -> R> Parts<T, R, F> {
         }
     }
 
-    /// Works on the next part, and tells its processor time; none where no part is left.
+    /// Works on the next part, and returns its processor time; `None` where no part is left.
     pub(super) fn work(&self) -> Option<Duration> {
         let (number, mut part) = {
             let mut state = lock(&self.state);
@@ -71,10 +71,11 @@ impl<T, R, F: Fn(&mut T) -> R> Parts<T, R, F> {
         Some(time)
     }
 
-    /// Takes all parts back in their order, once none is worked on. Those that wait are not begun.
+    /// Waits until no part is worked on, and takes all parts back in their order. Parts that wait are not begun any
+    /// more.
     ///
     /// # Panics
-    /// As a step did.
+    /// With the panic of a step.
     pub(super) fn end(&self) -> Vec<Outcome<T, R>> {
         let mut state = lock(&self.state);
         let left = std::mem::take(&mut state.waiting);

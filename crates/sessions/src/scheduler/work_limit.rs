@@ -1,7 +1,7 @@
-//! When work on several frames stops early: between two of them.
+//! Bounds of one request's work. Work on several frames stops early between two of them.
 //!
-//! A thread cannot be stopped from outside. So the work itself asks, before each frame, whether it should go on. There
-//! it also lets other clients' requests go first.
+//! A thread cannot be stopped from outside. So the work itself asks, before each frame, whether it should go on. At
+//! these moments it also lets other clients' requests go first.
 
 use super::executor::CpuClock;
 use super::fair_queue::WorkerSlot;
@@ -11,13 +11,13 @@ use crate::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Why work was stopped. What it had done was undone.
+/// Why work was stopped. What it had done does not count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Stopped {
     /// Nobody waits for the answer any more.
     #[error("the client has gone")]
     Abandoned,
-    /// It was not begun: the client's requests wait too long for a worker.
+    /// The work was not begun: the client's requests wait too long for a worker.
     #[error("the client's requests wait too long")]
     Overload,
     /// The time of the request is over.
@@ -28,7 +28,7 @@ pub enum Stopped {
     Cost(Duration),
 }
 
-/// Processor time that the work of one request has taken. Clones are the same request's.
+/// Processor time that the work of one request has taken. Clones share the count.
 #[derive(Debug, Clone, Default)]
 pub struct CpuSpent(Arc<AtomicU64>);
 
@@ -43,7 +43,7 @@ impl CpuSpent {
     }
 }
 
-/// What a request's work may take. Clones share whether it was abandoned.
+/// The deadline and the processor time that a request's work may take. Clones share whether the work was abandoned.
 #[derive(Debug, Clone)]
 pub struct WorkLimit {
     deadline: Instant,
@@ -53,7 +53,8 @@ pub struct WorkLimit {
 }
 
 impl WorkLimit {
-    /// Until `deadline`, with at most `max_cpu` of processor time, of which the request has `spent` some before.
+    /// Lets work go on until `deadline`, with at most `max_cpu` of processor time. `spent` is what the request took of
+    /// it before.
     pub fn new(deadline: Instant, max_cpu: Duration, spent: CpuSpent) -> Self {
         Self {
             deadline,
@@ -68,7 +69,7 @@ impl WorkLimit {
         AbandonOnDrop(self.abandoned.clone())
     }
 
-    /// Begins to count this thread's processor time, while the work has this turn.
+    /// Begins to count this thread's processor time, for work that has the worker `turn`.
     pub fn start<'a>(&'a self, turn: &'a mut WorkerSlot) -> WorkMeter<'a> {
         let cpu = turn.cpu();
         WorkMeter {
@@ -92,14 +93,14 @@ impl Drop for AbandonOnDrop {
     }
 }
 
-/// Counts what work takes on this thread.
+/// Counts the processor time of work, and stops it at its limits.
 #[derive(Debug)]
 pub struct WorkMeter<'a> {
     limit: &'a WorkLimit,
     turn: &'a mut WorkerSlot,
     cpu: CpuClock,
     started: Duration,
-    /// What other threads have taken.
+    /// Processor time that the work took on other threads.
     elsewhere: Duration,
     steps: Vec<Duration>,
 }
@@ -114,11 +115,11 @@ impl WorkMeter<'_> {
     }
 
     /// Does `step` to each of `parts`, here and on workers that are idle, and notes its processor time. Before each
-    /// part that is done here it [asks](Self::check) whether to go on. The parts come back in their order, and the
-    /// results of those that were done.
+    /// part that is done on this thread it [checks](Self::check) whether the work may go on. The parts come back in
+    /// their order, and the results of those that were done.
     ///
     /// # Panics
-    /// A step did.
+    /// With the panic of a step.
     pub fn side_by_side<T, R>(
         &mut self,
         parts: Vec<T>,
@@ -165,7 +166,7 @@ impl WorkMeter<'_> {
     /// Whether the work may go on. Waits while requests of clients with a better claim have its worker.
     ///
     /// # Errors
-    /// It may not.
+    /// It may not; the value says why.
     pub fn check(&mut self) -> Result<(), Stopped> {
         let limit = self.limit;
         self.turn.yield_to_others();
@@ -217,7 +218,7 @@ mod tests {
             checked = meter.check();
         }
         assert_eq!(checked, Err(Stopped::Cost(Duration::from_micros(10))));
-        // What the request's next work would take is used up, too.
+        // The request's next work finds the processor time used up, too.
         drop(meter);
         let next = limit.start(&mut turn).check();
         assert_eq!(next, Err(Stopped::Cost(Duration::from_micros(10))));
