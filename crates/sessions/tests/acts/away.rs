@@ -88,7 +88,7 @@ async fn a_box_is_corrected_in_the_first_picture_after_a_snapshot() {
     let corrected = correct(to, pictures(1..2)).await.unwrap();
     assert_eq!(corrected.estimates[0].first().target, to);
     assert_eq!(corrected.warnings, None);
-    // Most of it is outside.
+    // Most of the box is outside the picture.
     let outside = Rect::new(-10.0, 20.0, 16.0, 12.0);
     let warned = correct(outside, pictures(1..2)).await.unwrap();
     let warnings = warned.warnings.unwrap();

@@ -43,7 +43,7 @@ async fn frames_are_answered_once_and_again_under_the_same_number() {
     let opening = opening.unwrap();
     assert!(opening.replayed && opening.estimates[0].first().target == FIRST);
     assert_eq!(session.latest_frame(), 3);
-    // Its frames for themselves, too: answers of requests on their way may be lost.
+    // Parts of the request are replays, too: the client may have lost only some of the answers.
     for (number, files) in [(1, pictures(1..3)), (2, pictures(2..3))] {
         let count = files.len();
         let part = post_numbered(&service, &session, number, files).await;
@@ -54,7 +54,7 @@ async fn frames_are_answered_once_and_again_under_the_same_number() {
     let out_of_order = |got| ReplayError::OutOfOrder { got, expected: 4 };
     let differs = |got| ReplayError::Differs { got, expected: 4 };
     for (number, files, expected) in [
-        // The last of these is new.
+        // The last frame of this request is new.
         (2, pictures(2..5), out_of_order(2)),
         (3, pictures(1..2), differs(3)),
         (5, pictures(5..6), out_of_order(5)),
@@ -63,7 +63,7 @@ async fn frames_are_answered_once_and_again_under_the_same_number() {
         let refused = post_numbered(&service, &session, number, files).await;
         assert_matches!(refused, Err(FramesError::Replay(error)) if *error == expected);
     }
-    // Without a number it is the next one, also with the bytes of the last.
+    // A frame without a number is the next one, even with the bytes of the last.
     let next = FrameBatch::posted(None, pictures(3..4), None);
     let next = post(&service, &session, next).await.unwrap();
     assert_eq!(next.estimates[0].first().frame, 4);
@@ -138,7 +138,7 @@ async fn several_frames_have_so_many_pixels_together_and_one_may_have_more() {
             .await
             .is_ok()
     );
-    // What is no picture is refused in its turn, and has no pixels.
+    // A file that is no picture counts as 0 pixels here; it is refused when its turn comes.
     let with_text = vec![picture(1), "no picture".into(), picture(2)];
     assert!(check_readable_pixels(&with_text, &limits).is_ok());
 
@@ -245,7 +245,7 @@ async fn the_last_answers_are_kept_and_more_where_that_is_asked_for() {
     );
     assert_eq!(stored_from(&service, &session, 4).await, Some(vec![]));
     assert_eq!(stored_from(&service, &session, 5).await, None);
-    // Those of further requests, up to so many.
+    // Answers of earlier requests are kept, up to [`KEPT_ANSWERS`].
     let (kept, last) = (KEPT_ANSWERS as u64, KEPT_ANSWERS as u64 + 6);
     for number in 4..=last {
         post_numbered(&service, &session, number, pictures(4..5))
@@ -261,7 +261,7 @@ async fn the_last_answers_are_kept_and_more_where_that_is_asked_for() {
     assert!(again.await.unwrap().replayed);
     let (got, expected) = (first - 1, last + 1);
     let out_of_order = ReplayError::OutOfOrder { got, expected };
-    // Nor where the answers to the later of them are kept.
+    // A request is refused even where the answers to its later frames are kept.
     for files in [pictures(4..5), [pictures(4..5), pictures(4..5)].concat()] {
         let late = post_numbered(&service, &session, got, files).await;
         assert_matches!(late, Err(FramesError::Replay(error)) if *error == out_of_order);
@@ -372,7 +372,7 @@ async fn each_answer_of_each_target_is_counted() {
     }
     let opened = service.open(request(&service, None, 0, start)).await;
     let session = opened.unwrap().session;
-    // The targets are seen, then nothing is, and then they are there again.
+    // The targets are visible, then hidden, then visible again.
     let nothing = image::GrayImage::from_fn(SIZE.0, SIZE.1, |x, y| {
         image::Luma([(x * 131 + y * 17) as u8 ^ (x * y) as u8])
     });

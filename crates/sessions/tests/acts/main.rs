@@ -1,5 +1,5 @@
-//! What the acts of a service without a store do, and what they refuse. Its work runs on the thread of the test, so
-//! that waiting takes no time where the test's time is paused.
+//! What the acts of a service without a store do, and what they refuse. The service's work runs on the thread of the
+//! test, so that waiting takes no time where the test pauses the clock.
 
 mod away;
 #[path = "../common/mod.rs"]

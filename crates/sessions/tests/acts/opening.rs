@@ -45,7 +45,7 @@ async fn a_request_that_comes_again_finds_the_session_that_it_opened() {
     of_ann.key = Some(CreationKey::Key(of_ann.owner.clone(), "one".to_owned()));
     let of_ann = service.open(of_ann).await.unwrap();
     assert!(!of_ann.replayed && of_ann.session.id() != first.session.id());
-    // What has ended is opened anew.
+    // After the session has ended, the same key opens a new one.
     let id = first.session.id();
     service.end(id, &Owner::default(), FLOW).await.unwrap();
     let anew = ask(key("one"), 2).await.unwrap();
@@ -89,7 +89,7 @@ async fn a_full_service_opens_none_until_a_session_has_gone() {
         assert_matches!(refused, OpenError::Act(ActError::TooManySessions(told)) if *told == full);
     }
     assert!(service.check_room(&FREE).is_err());
-    // One that was used lives, the others have expired.
+    // The session that was used lives, the others have expired.
     clock.advance(LEASE.first - SECOND_OF_TIME);
     let used = &all[1];
     post_numbered(&service, used, 1, vec![picture(1)])
@@ -205,7 +205,7 @@ async fn a_session_is_its_owner_s_until_it_expires_or_is_ended() {
     let (nobody, ann) = (Owner::default(), Owner::named("ann"));
     let session = open(&service, Boxes::One(FIRST)).await;
     let id = session.id();
-    // The moment in which it was opened is not quite the whole second.
+    // The moment of opening has a fraction of a second, so the expiry may round down.
     let opened = session.opening().expires;
     assert!(
         (1_800_000_059..=1_800_000_060).contains(&opened),
@@ -223,7 +223,7 @@ async fn a_session_is_its_owner_s_until_it_expires_or_is_ended() {
     assert_eq!(missing(&service, id, &ann).await, NoSession::Unknown);
     assert_eq!(missing(&service, id, &nobody).await, NoSession::Expired);
     assert!(session.is_closed());
-    // That is remembered for an hour.
+    // The expiry is remembered for an hour.
     clock.advance(Duration::from_secs(3_599));
     assert_eq!(missing(&service, id, &nobody).await, NoSession::Expired);
     clock.advance(SECOND_OF_TIME);

@@ -30,14 +30,14 @@ async fn a_frame_that_was_taken_renews_a_session_and_one_that_is_refused_does_no
     let refused = post_numbered(&service, &session, 7, pictures(1..2)).await;
     assert!(!refused.unwrap_err().is_temporary());
     assert_eq!(left(&session), LEASE.first.as_secs() - 10);
-    // The second time it is the stored answer.
+    // The second time the stored answer is given.
     for _ in 0..2 {
         let taken = post_numbered(&service, &session, 1, pictures(1..2)).await;
         assert!(taken.is_ok());
         assert_eq!(left(&session), LEASE.idle.as_secs());
         later();
     }
-    // Looking at it is no use.
+    // Reading the session does not renew it.
     let permit = session.read_permit().unwrap();
     service.snapshot(permit, place(&service)).await.unwrap();
     assert_eq!(left(&session), LEASE.idle.as_secs() - 10);
@@ -62,7 +62,7 @@ async fn a_session_does_not_end_because_there_was_no_time_for_its_frame() {
         ..FrameBatch::posted(Some(1), pictures(1..2), None)
     };
     let posted = FrameBatch::posted(Some(1), pictures(1..2), None);
-    // A stream renews it with the frames that are taken.
+    // A stream renews the session only with frames that are taken.
     for (batch, lease) in [
         (of_stream, LEASE.first - WORK_TIMEOUT),
         (posted, LEASE.idle),
@@ -84,7 +84,7 @@ async fn a_request_that_costs_too_much_is_refused_and_renews_nothing() {
     let clock = Clock::default();
     let mut of = parts(&clock);
     of.admission = Admission::new(8, 1, Duration::ZERO).unwrap();
-    // Enough for a first frame, and not for so many.
+    // Enough for one frame, and not for all.
     of.settings.max_request_cpu = Duration::from_millis(200);
     let service = SessionService::new(of);
     let session = open(&service, Boxes::One(FIRST)).await;

@@ -22,7 +22,7 @@ async fn a_frame_without_a_number_is_refused_beside_another() {
     assert!(matches!(refused, FramesError::NotInOrder), "{refused}");
     assert!(ask(&second, Some(1)).await.is_ok(), "its number tells");
     drop((first, second));
-    // Whoever only looks is none.
+    // A reader does not count as a request with frames.
     let reader = session.read_permit().unwrap();
     assert!(!session.enter().unwrap().overlaps());
     drop(reader);
@@ -34,7 +34,7 @@ async fn an_early_frame_waits_for_those_before_it_and_not_for_ever() {
     let session = open(&service, Boxes::One(FIRST)).await;
     let early = session.enter().unwrap();
     let begun = clock::now();
-    // Those whose turn it is, that are late, or far too early, do not wait.
+    // Frames whose turn it is, late frames and frames that are far too early do not wait.
     for number in [0, 1, 18, u64::MAX] {
         let place = place(&service);
         let turn = service.wait_for_turn(&early, place, Some(number)).await;
@@ -100,7 +100,7 @@ async fn the_last_place_at_a_session_is_left_to_the_frame_whose_turn_it_is() {
     let refused = service.wait_for_turn(&permits[3], place(&service), Some(3));
     let refused = refused.await.map(drop).unwrap_err();
     assert_matches!(refused, FramesError::Act(ActError::Busy(_)));
-    // Who waits already goes on waiting.
+    // A frame that waits already goes on waiting.
     assert!(futures_util::poll!(&mut waiting).is_pending());
     drop(waiting);
     drop(early);

@@ -17,19 +17,19 @@ pub use crate::common::{FIRST, FLOW, FREE, Quota, params, place, request};
 /// Width and height of the pictures.
 pub const SIZE: (u32, u32) = (96, 72);
 pub const PIXELS: u64 = 96 * 72;
-/// Another target, which stands.
+/// Another target, which does not move.
 pub const SECOND: Rect = Rect {
     x: 60.0,
     y: 40.0,
     width: 20.0,
     height: 16.0,
 };
-/// What a session lives before its first frame, and after one.
+/// How long a session lives before its first frame, and after each.
 pub const LEASE: Lease = Lease {
     first: Duration::from_secs(60),
     idle: Duration::from_secs(600),
 };
-/// What a request may take.
+/// How long a request may take.
 pub const WORK_TIMEOUT: Duration = Duration::from_secs(30);
 /// Most sessions of a service.
 pub const SESSIONS: usize = 3;
@@ -38,12 +38,12 @@ pub fn png(picture: GrayImage) -> Bytes {
     encode(picture, ImageFormat::Png).into()
 }
 
-/// Picture `number`. The first target has moved by two pixels to the right, and by one down, from each to the next.
+/// Picture `number`. From each picture to the next the first target moves two pixels to the right and one down.
 pub fn picture(number: u32) -> Bytes {
     let mut scene = scene(number);
     for (x, y, pixel) in scene.enumerate_pixels_mut() {
         let (dx, dy) = (x.wrapping_sub(60), y.wrapping_sub(40));
-        // The first target is before it, and the ground is darker than both.
+        // The second target lies behind the first, so only pixels of the darker background are set.
         if dx < 20 && dy < 16 && pixel.0[0] < 100 {
             *pixel = Luma([150 + ((dx * 5) ^ (dy * 9)) as u8 % 100]);
         }

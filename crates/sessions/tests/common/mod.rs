@@ -36,7 +36,7 @@ pub fn params() -> Params {
     params
 }
 
-/// The parts of a service without a store, where a request may take so long.
+/// The parts of a service without a store, where a request may take `limit`.
 pub fn parts(registry: Registry, admission: Admission, limit: Duration) -> ServiceParts {
     ServiceParts {
         settings: ServiceSettings {
@@ -111,7 +111,7 @@ fn exhausted(what: &'static str, limit: usize) -> OpenError {
     QuotaExhausted { what, limit }.into()
 }
 
-/// A request for a session, with the digest that is this byte again and again.
+/// A request for a session, whose digest is 32 times the byte `digest`.
 pub fn request(
     service: &SessionService,
     key: Option<CreationKey>,

@@ -1,4 +1,4 @@
-//! What one replica makes of a session that another has, in a store that works.
+//! What a replica does with its cached copy of a session while another replica uses the session, in a store that works.
 
 use crate::common::{FLOW, assert_matches, place};
 use crate::formats::{open, post};
@@ -54,7 +54,8 @@ async fn an_early_frame_waits_for_those_that_another_replica_takes() {
     assert!(turn.is_ok() && posted.is_ok());
     assert!(!early.is_early(2), "the store has told of the frame before");
     assert_eq!(session.latest_frame(), 1);
-    // Nobody sends the next one. Meanwhile others take all places at the session, which once ended the wait.
+    // Nobody sends the next frame. Meanwhile other requests take all places at the session, which must not end the
+    // wait.
     tokio::time::pause();
     let begun = clock::now();
     let others = async { std::iter::from_fn(|| session.enter().ok()).collect::<Vec<_>>() };
@@ -128,7 +129,7 @@ async fn what_another_replica_has_answered_is_answered_again() {
         let tracked = send(&other, Some(number), picture(0, number))
             .await
             .unwrap();
-        // Once the replica has the first frame in memory, and then the frame before.
+        // At first the replica has frame 0 in memory, the second time the newest frame.
         for _ in 0..2 {
             let again = send(&first, Some(number), picture(0, number))
                 .await
@@ -211,7 +212,7 @@ async fn a_session_lives_as_long_as_the_store_says() {
     let (folder, clock) = (tempfile::tempdir().unwrap(), Clock::default());
     let ([first, other], store) = two_by(&clock, folder.path()).await;
     let (minute, later) = (Duration::from_secs(60), LONG - Duration::from_secs(60));
-    // It lives longer, for the other replica has answered a frame of it again.
+    // The session lives longer here, since the other replica has answered a stored frame again.
     send(&first, Some(1), picture(0, 1)).await.unwrap();
     let session = cached(&other).await;
     clock.advance(later);
@@ -219,7 +220,7 @@ async fn a_session_lives_as_long_as_the_store_says() {
     send(&first, Some(1), picture(0, 1)).await.unwrap();
     other.refresh(&session, None, FLOW).await.unwrap();
     assert!(session.ttl() > later, "{:?}", session.ttl());
-    // There was no time for a frame, which renews it here and there.
+    // A frame for which there was no time renews the session here and in the store.
     clock.advance(later);
     let at_work = session.enter().unwrap().lock().await.unwrap();
     let refused = send(&other, Some(2), picture(0, 2)).await.unwrap_err();
@@ -232,7 +233,7 @@ async fn a_session_lives_as_long_as_the_store_says() {
         "{:?}",
         stored.ttl
     );
-    // A look does not.
+    // A look does not renew it.
     clock.advance(later);
     other.refresh(&session, None, FLOW).await.unwrap();
     assert!(session.ttl() <= minute, "{:?}", session.ttl());

@@ -1,4 +1,4 @@
-//! How long the store in a folder keeps what it has, by a clock that is moved.
+//! How long the store in a folder keeps its sessions, by a clock that the test moves.
 
 use crate::folder::{Known, open_by};
 use bagtrack_sessions::{Clock, FileStore, Outcome, SessionStore};
@@ -13,11 +13,11 @@ const HOUR: Duration = Duration::from_secs(3600);
 /// minutes.
 const ALMOST: Duration = Duration::from_secs(3600 - 60);
 
-/// The store after it was closed and has looked for what has expired.
+/// Closes the store and opens it again. The returned store has swept what has expired.
 async fn swept(store: FileStore, folder: &TempDir, clock: &Clock) -> FileStore {
     drop(store);
     let store = open_by(folder.path(), clock);
-    // It looks after the first call at the latest, and before the second.
+    // The store sweeps after the first call at the latest, and before the second.
     for _ in 0..2 {
         store.load(Uuid::nil()).await.unwrap();
     }
@@ -44,7 +44,7 @@ async fn a_session_is_kept_until_its_time_is_over() {
     session.advance_for(&store, HOUR).await;
     clock.advance(ALMOST);
     store = swept(store, &folder, &clock).await;
-    // A look does so only if it is to.
+    // A check renews it only with `renew`.
     let look = |renew| store.check(session.name, session.version, false, renew);
     assert!(time_left(look(None).await.unwrap()) < 2 * MINUTE);
     assert!(time_left(look(None).await.unwrap()) < 2 * MINUTE);
@@ -102,8 +102,8 @@ async fn the_time_in_which_the_store_is_closed_counts() {
 /// Hours since 1970 by the wall clock of the test below.
 static HOURS: AtomicU64 = AtomicU64::new(0);
 
-/// Boards without a battery set their clock soon after the start, and a machine that was suspended does: that ended all
-/// sessions with the next restart.
+/// Boards without a battery set their clock soon after the start, and so does a machine after it was suspended. Neither
+/// may end sessions at the next restart.
 #[tokio::test]
 async fn a_wall_clock_that_is_set_ends_no_session_and_lets_none_live_on() {
     let clock = || {
@@ -129,7 +129,7 @@ async fn a_wall_clock_that_is_set_ends_no_session_and_lets_none_live_on() {
         let store = open_by(folder.path(), &clock());
         assert!(left(&store).await.is_some_and(|left| left >= 60));
         drop(store);
-        // The time in which it is closed counts, as the wall clock has it.
+        // The time in which the store is closed counts by the wall clock.
         HOURS.store(then + 1, Ordering::Relaxed);
         let store = open_by(folder.path(), &clock());
         assert!(left(&store).await.is_some_and(|left| left <= 2));
@@ -137,7 +137,8 @@ async fn a_wall_clock_that_is_set_ends_no_session_and_lets_none_live_on() {
         HOURS.store(then + 2, Ordering::Relaxed);
         assert_eq!(left(&open_by(folder.path(), &clock())).await, None);
     }
-    // A board that begins in 1970 each time: what it has expires, and the time goes on.
+    // The clock of a board begins in 1970 at each start: its sessions expire nevertheless, since the folder's time goes
+    // on.
     HOURS.store(56 * 365 * DAY, Ordering::Relaxed);
     let store = open_by(folder.path(), &clock());
     let session = Known::create(&store, 9, HOUR).await;

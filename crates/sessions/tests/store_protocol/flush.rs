@@ -6,8 +6,8 @@ use crate::world::{ID, LONG, service, service_by, start};
 use bagtrack_sessions::{Clock, Durability, FileStore, SessionStore};
 use std::sync::Arc;
 
-/// Seeds 3419 and 13250 of the simulation: the last state was written with the time that was left of the session by the
-/// replica's clock, which was none after a jump, and the store dropped the record.
+/// Seeds 3419 and 13250 of the simulation. After a jump of its clock, the session has no time left by the replica's
+/// clock. If the last state were written with that time to live, the store would drop the record.
 #[tokio::test]
 async fn a_session_outlives_a_jump_of_the_clock_of_a_replica_that_ends() {
     let folder = tempfile::tempdir().unwrap();

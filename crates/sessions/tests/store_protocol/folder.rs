@@ -195,7 +195,7 @@ async fn expired_sessions_are_swept_and_their_space_is_given_back() {
         blocks.map(|file| file.blocks() * 512).sum::<u64>()
     };
     let idle = Duration::from_secs(600);
-    // 2,000 sessions of 36 KiB are 70 MiB. Each round leaves them to expire; what stays is the journal.
+    // 2,000 sessions of 36 KiB are 70 MiB. Each round's sessions expire, so only the journal could grow.
     for round in 0..4 {
         for seed in 1..=2000 {
             Known::create(&store, 2000 * round + seed, idle).await;
@@ -222,7 +222,7 @@ async fn expired_sessions_are_swept_and_their_space_is_given_back() {
     assert_eq!(store.load(Uuid::from_u128(1)).await.unwrap(), None);
 }
 
-/// How a damaged folder was taken: what its sessions are then.
+/// Opens a damaged folder and looks at its sessions. Returns how many are whole, or why the folder was refused.
 async fn look(folder: &Path, sessions: &[Known], damage: &str) -> Result<usize, String> {
     let store = open(folder, Durability::default());
     let store = store.map_err(|refused| {
@@ -237,7 +237,7 @@ async fn look(folder: &Path, sessions: &[Known], damage: &str) -> Result<usize, 
     })?;
     let mut intact = 0;
     for session in sessions {
-        // Of what is told, nothing was made up: a state is one that was written.
+        // A record that is told has a state that was written.
         if let Ok(Some(record)) = store.load(session.name.id).await {
             let frame = record.version.frame;
             let written = state((session.name.incarnation << 32) + frame);
@@ -283,7 +283,8 @@ async fn a_write_that_was_cut_off_is_left_out_and_no_other() {
     assert_eq!((intact, log.text()), (Ok(4), String::new()));
 }
 
-/// How many bytes of a journal were left out when it was read. It has zeros after what it keeps, or nothing.
+/// How many bytes of a journal were left out when it was read. The journal ends after what was kept, or has zeros
+/// there.
 fn left_out(folder: &Path, journal: &Path, torn: &[u8]) -> usize {
     let kept = fs::read(folder.join(journal)).unwrap();
     let same = kept
@@ -327,7 +328,7 @@ async fn a_folder_that_cannot_be_written_is_tried_again_and_nothing_answered_is_
     let store = open(&folder, DURABILITIES[1]).unwrap();
     let mut session = Known::create(&store, 1, TTL).await;
     session.advance(&store).await;
-    // A file takes the folder's place: what is open can be written, but no further table.
+    // A file takes the folder's place: open files can still be written, but no new table can be made.
     fs::rename(&folder, &aside).unwrap();
     fs::write(&folder, "a file").unwrap();
     let mut seed = 1;
@@ -354,7 +355,7 @@ async fn a_folder_that_cannot_be_written_is_tried_again_and_nothing_answered_is_
     }
     let loaded = store.load(session.name.id).await.unwrap().unwrap();
     assert!(session.is(&loaded));
-    // It may have failed at once, where the store wrote a table beside.
+    // The first write may have failed already, where the store was writing a table.
     if seed > 2 {
         let last = store.load(Uuid::from_u128(u128::from(seed - 1))).await;
         assert!(last.unwrap().unwrap().state == state(seed - 1));
@@ -362,7 +363,7 @@ async fn a_folder_that_cannot_be_written_is_tried_again_and_nothing_answered_is_
     session.advance(&store).await;
 }
 
-/// What a process that is killed while it makes the store leaves, step by step.
+/// The files that a process leaves which is killed while it makes the store, after each step.
 #[tokio::test]
 async fn a_first_start_that_was_broken_off_is_begun_anew() {
     for step in ["lock", "keyspaces/", "0.jnl", "version", "keyspaces/0/"] {
@@ -471,7 +472,7 @@ async fn a_client_has_so_many_places_in_the_store_until_its_sessions_end_or_expi
     assert!(store.end(counted(2).name, TTL).await.unwrap());
     assert!(store.admit(&share("one"), counted(6)).await.unwrap());
     assert!(!store.admit(&share("one"), counted(7)).await.unwrap());
-    // They do not count for ever where nobody ends them.
+    // Sessions that nobody ends count until they expire.
     clock.advance(TTL);
     assert!(store.admit(&share("one"), counted(8)).await.unwrap());
 }

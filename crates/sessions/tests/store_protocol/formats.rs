@@ -1,4 +1,4 @@
-//! What earlier releases have written is read by this one, and what later ones write is refused and left as it is.
+//! This version reads what earlier releases have written. It refuses what later ones write, and leaves it as it is.
 //!
 //! `tests/fixtures` has a folder for each release: sessions that stand at frame 2, as snapshots, as records of a Redis
 //! (a file for each field) and in a store's folder, with their frames and the answers of the undisturbed run. A release
@@ -28,7 +28,7 @@ const LONG: Duration = Duration::from_secs(60);
 /// The frame at which the sessions of a release stand, and the last one.
 const AT: u64 = 2;
 const LAST: u64 = 5;
-/// A part of a pixel. The tracker's sums are rounded otherwise with other vector units.
+/// In pixels. The tracker's sums are rounded differently by other vector units.
 const TOLERANCE: f64 = 0.5;
 /// A format that no version has.
 const LATER: u8 = 99;
@@ -111,11 +111,11 @@ async fn redis_store(redis: &Redis) -> Arc<RedisStore> {
     )
 }
 
-/// What a release has written.
+/// The fixtures of a release.
 struct Release(PathBuf);
 
 impl Release {
-    /// Those in the project.
+    /// All fixtures in the project.
     fn all() -> Vec<Self> {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
         let releases = fs::read_dir(folder).unwrap();
@@ -156,7 +156,7 @@ impl Release {
         fields.collect()
     }
 
-    /// Writes what this version writes.
+    /// Writes the fixtures of this version.
     async fn write_all(&self) {
         for number in 0..=LAST {
             self.write(&format!("frames/{number}.png"), &picture(0, number));
@@ -213,7 +213,7 @@ impl Release {
         self.trim_journals();
     }
 
-    /// Cuts what the database has made room for and not written: 64 MiB of it.
+    /// Cuts the 64 MiB from the journals that the database has allocated and not written.
     fn trim_journals(&self) {
         for entry in fs::read_dir(self.0.join("sessions")).unwrap() {
             let path = entry.unwrap().path();
@@ -226,7 +226,7 @@ impl Release {
         }
     }
 
-    /// A session goes on as the run did that wrote it.
+    /// Checks that a session goes on as the undisturbed run of its release did.
     async fn goes_on(&self, service: &SessionService, kind: Kind) {
         let expected = self.read(&format!("{}.json", kind.name()));
         let expected: Vec<Estimates> = serde_json::from_slice(&expected).unwrap();
@@ -303,7 +303,7 @@ async fn a_snapshot_of_a_later_version_is_refused() {
     }
 }
 
-/// Where a version is, by the lengths of the bytes and of the head.
+/// Where a format version is, from the lengths of the bytes and of the head.
 type Place = fn(usize, usize) -> usize;
 
 /// Changes the row and the state of a session in a store's folder.
@@ -363,7 +363,7 @@ async fn what_a_later_version_has_in_a_folder_is_refused_and_left_as_it_is() {
         // The other sessions of the folder can be used meanwhile.
         release.goes_on(&older, Kind::List).await;
         drop(older);
-        // The later version comes back, and has what it had.
+        // The later version comes back, and finds its session unchanged.
         change(folder.path(), kind.id(), |row, state| {
             let bytes = if is_row { row } else { state };
             let at = at(bytes.len(), head);
@@ -375,7 +375,7 @@ async fn what_a_later_version_has_in_a_folder_is_refused_and_left_as_it_is() {
     }
 }
 
-/// It was taken, and frames were then counted from the record's number.
+/// If such a record were taken, frames would be counted from the record's number.
 #[tokio::test]
 async fn a_record_whose_state_is_of_another_frame_is_refused() {
     let release = &Release::all()[0];
@@ -442,7 +442,7 @@ async fn records_of_earlier_releases_go_on_and_those_of_later_ones_are_left_as_t
             release.goes_on(&here, kind).await;
             let now = fields(&mut link, kind.id()).await;
             assert!(now.keys().eq(record.keys()), "a record's fields");
-            // One that was opened now has the same fields.
+            // A session that this version opens has the same fields.
             let new = Uuid::from_u128(9);
             let file = release.frame(0).1;
             let (boxes, params) = (PerTarget::One(FIRST), Box::new(params(1)));

@@ -12,7 +12,7 @@ use tokio::sync::{Notify, oneshot};
 use tokio::time::timeout;
 use uuid::Uuid;
 
-/// No request works for so long.
+/// Longer than any request works.
 const LONG: Duration = Duration::from_secs(60);
 
 type Reply = Box<dyn Any + Send>;
@@ -22,7 +22,7 @@ type Sender = oneshot::Sender<Option<Reply>>;
 /// A call on its way to the store.
 pub struct Call {
     script: Script,
-    /// None for one that was sent again by the connection: nobody waits for its reply.
+    /// `None` for a call that the connection sent again: nobody waits for its reply.
     sender: Option<Sender>,
     creates: bool,
 }
@@ -33,11 +33,11 @@ struct Wire {
     replies: Vec<(Sender, Reply)>,
     /// Requests that neither wait for the store nor have ended.
     busy: usize,
-    /// Whether all is done and answered at once.
+    /// Whether each call is done and answered at once.
     is_quick: bool,
 }
 
-/// The store. Clones are the same.
+/// The store. Clones share its records and calls.
 #[derive(Clone)]
 pub struct HostileStore {
     wire: Arc<Mutex<Wire>>,
@@ -61,12 +61,12 @@ impl Drop for Busy {
 }
 
 impl HostileStore {
-    /// With these records.
+    /// A store with these records.
     pub fn new(records: impl Backend + 'static) -> Self {
         Self::with(records, false)
     }
 
-    /// One in memory that does all at once.
+    /// A store in memory that does each call at once.
     pub fn at_once() -> Self {
         Self::with(Records::default(), true)
     }
@@ -141,7 +141,7 @@ impl HostileStore {
         }
     }
 
-    /// A call was sent twice, where there is a connection that may do that.
+    /// Sends a call twice, where the store has a connection that may do that.
     pub fn repeat(&self, pick: usize) {
         let mut wire = self.wire();
         if !wire.records.knows_repeats() {
@@ -172,7 +172,8 @@ impl HostileStore {
         self.wire().records.load(id).is_some()
     }
 
-    /// What makes a record is not on its way for so long that one that was there is lost or ended meanwhile.
+    /// Drops the calls that create a record: none is on its way for so long that an existing record is lost or ended
+    /// meanwhile.
     pub fn drop_creates(&self) {
         let mut wire = self.wire();
         let calls = wire.calls.drain(..);
@@ -218,8 +219,8 @@ impl HostileStore {
     }
 }
 
-/// A request that waits for the store, and so is not busy. Dropped while it waits, it counts as busy again, which its
-/// `Busy` takes back.
+/// A request that waits for the store, and so is not busy. A request that is dropped while it waits counts as busy
+/// again, until its `Busy` is dropped.
 struct Waiting<'a> {
     store: &'a HostileStore,
     reply: oneshot::Receiver<Option<Reply>>,
@@ -233,7 +234,7 @@ impl Waiting<'_> {
 
 impl Drop for Waiting<'_> {
     fn drop(&mut self) {
-        // One whose reply has been delivered is busy since then, whether it has seen the reply or was given up before.
+        // `deliver` has made the request busy, whether the request has seen the reply or was given up before.
         self.reply.close();
         let is_delivered = self.reply.is_terminated() || self.reply.try_recv().is_ok();
         if !is_delivered {

@@ -39,7 +39,7 @@ async fn keys_hold_for(store: Arc<dyn SessionStore>) {
     let other = service(Some(store), 1);
     let (ann, ben) = (Owner::named("ann"), Owner::named("ben"));
     let good = || picture(0, 0);
-    // Its first try was refused.
+    // The first request with the key is refused.
     let refused = ask(&one, &ann, "a", b"no picture".to_vec()).await;
     assert!(matches!(refused, Err(OpenError::Frame(_))), "{refused:?}");
     let first = ask(&one, &ann, "a", good()).await.unwrap();
@@ -61,7 +61,7 @@ async fn keys_hold_for(store: Arc<dyn SessionStore>) {
         assert_eq!(both.0.session.name(), both.1.session.name());
         assert!(both.0.replayed != both.1.replayed, "one has opened it");
     }
-    // What has ended is opened anew.
+    // After the session has ended, the same key opens a new one.
     one.end(first.session.id(), &ann, FLOW).await.unwrap();
     let anew = ask(&other, &ann, "a", good()).await.unwrap();
     assert!(!anew.replayed && anew.session.name() != first.session.name());
@@ -86,7 +86,8 @@ async fn with_a_store_in_redis_a_key_opens_one_session() {
     keys_hold_for(Arc::new(redis.store(Duration::from_secs(5)).await)).await;
 }
 
-/// 54,000 such requests filled a Redis of 14 MB with names for a day, and no frame of any client was taken any more.
+/// If each refused request left a key, 54,000 of them would fill a Redis of 14 MB, and no client's frames could be
+/// taken.
 #[tokio::test]
 #[ignore = "needs redis-server"]
 async fn requests_with_keys_that_are_refused_leave_nothing_in_redis() {

@@ -1,4 +1,4 @@
-//! Stores of sessions, and what two replicas make of one that misbehaves.
+//! Tests of stores of sessions, and of two replicas over a store that misbehaves.
 //!
 //! [`suite`] holds for every store. [`schedule`] drives the real service, with trackers and workers, over a store that
 //! delays, drops, repeats and forgets.

@@ -13,7 +13,7 @@ struct Kept {
     token: u64,
 }
 
-/// What the store holds. Each write has a token: one that comes again does nothing.
+/// What the store holds. Each write has a token. A write that comes again with the same token does nothing.
 #[derive(Debug, Default)]
 pub struct Records {
     kept: HashMap<Uuid, Kept>,
@@ -138,7 +138,7 @@ impl Backend for Records {
     }
 
     fn restart(&mut self) {
-        // What is in memory is a Redis that goes on.
+        // These records stand for a Redis, which goes on without a restart.
     }
 
     fn knows_repeats(&self) -> bool {

@@ -15,7 +15,7 @@ pub const FRAMES: u64 = 6;
 /// Who sent each frame after the first: the client (0) or its rival (1).
 pub type History = Vec<u8>;
 
-/// Frame `number` as this sender sends it: the rival's target moves otherwise.
+/// Frame `number` as this sender sends it. In the rival's frames the target moves differently.
 pub fn picture(sender: u8, number: u64) -> Vec<u8> {
     let number = number as u32;
     let (left, top) = match sender {
@@ -57,7 +57,7 @@ fn tracker(known: &mut Trackers, seed: u64, history: &[u8]) -> Tracker {
     tracked
 }
 
-/// The histories after which this is the answer to the last frame: mostly one.
+/// The histories whose last frame has this answer: mostly one.
 pub fn histories(seed: u64, answer: &Estimates) -> Vec<History> {
     static KNOWN: OnceLock<Mutex<Trackers>> = OnceLock::new();
     let mut known = KNOWN.get_or_init(Mutex::default).lock().unwrap();

@@ -1,4 +1,4 @@
-//! What keeps the records of a store that misbehaves: memory, or a folder.
+//! The records behind a store that misbehaves: in memory, or in a folder.
 
 use bagtrack_sessions::{
     Clock, Commit, Durability, FileStore, Outcome, Record, SessionName, SessionStore, Version,
@@ -31,7 +31,7 @@ pub trait Backend: Send {
 /// Records in a folder.
 pub struct InFolder {
     folder: TempDir,
-    /// None while it is opened again.
+    /// `None` while it is opened again.
     store: Option<FileStore>,
 }
 
@@ -55,7 +55,7 @@ impl InFolder {
         self.store.as_ref().expect("it is open")
     }
 
-    /// Waits for the store's thread, which needs nothing of this one.
+    /// Waits for an answer of the store's thread, which does not depend on this one.
     fn wait<T>(future: bagtrack_sessions::StoreFuture<'_, T>) -> T {
         let mut future = future;
         loop {

@@ -18,7 +18,7 @@ use std::time::Duration;
 use uuid::Uuid;
 
 const LONG: Duration = Duration::from_secs(5);
-/// Of a store that a test waits for in vain: a busy machine answers in less.
+/// Time-out of a store that does not answer; also a busy machine answers in less.
 const SHORT: Duration = Duration::from_secs(1);
 
 /// A Redis that ends with the test.
@@ -61,11 +61,10 @@ async fn store_at(port: u16, timeout: Duration) -> RedisStore {
     store.await.unwrap()
 }
 
-/// A way to a Redis, whose connections of before a moment say nothing any more: neither a byte nor that they have
-/// ended.
+/// A proxy before a Redis that can silence its connections: from then on they carry no byte, and not even their end.
 struct Link {
     port: u16,
-    /// How often the connections of before went silent.
+    /// How often all connections so far were silenced.
     silences: Arc<AtomicUsize>,
 }
 
@@ -165,7 +164,7 @@ async fn in_redis_a_client_has_so_many_places_and_bytes_until_its_sessions_end()
     assert!(!admit("one", 80, 4000, 44).await);
 }
 
-/// Each of them took 263 calls of Redis.
+/// Looking for room takes 263 calls of Redis.
 #[tokio::test]
 #[ignore = "needs redis-server"]
 async fn refusals_of_one_client_do_not_look_for_room_each_time() {
@@ -194,7 +193,7 @@ async fn refusals_of_one_client_do_not_look_for_room_each_time() {
     let further = scripts() - before - once;
     let looks = begun.elapsed().as_secs() + 1;
     assert!(further >= 10 && further <= 10 + looks * once, "{further}");
-    // It looks again a moment later. In the test above a session ends, and there is room at once.
+    // A moment later the store looks for room again.
     bagtrack_sessions::clock::sleep(Duration::from_millis(1100)).await;
     let before = scripts();
     assert!(!admit(41).await);
@@ -231,7 +230,7 @@ async fn all_that_is_in_redis_goes_by_itself() {
             "client" => (7 * day - TTL, 7 * day),
             _ => panic!("{key}"),
         };
-        // One that has gone meanwhile has -2.
+        // `PTTL` is -2 for a key that has gone meanwhile.
         let is_gone = kind == "probe" && left == -2;
         let left = Duration::from_millis(u64::try_from(left).unwrap_or(0));
         assert!(is_gone || (left > least && left <= most), "{key}: {left:?}");
@@ -262,7 +261,7 @@ async fn a_commit_leaves_only_the_record_whatever_redis_says_to_its_transaction(
     let before_last = session.version;
     session.advance(&store).await;
     all_is_well();
-    // Another replica was there first.
+    // A commit of a replica that comes second.
     let late = Commit {
         name: session.name,
         before: before_last,
@@ -322,7 +321,7 @@ async fn a_connection_that_says_nothing_any_more_is_left_for_another() {
     }
 }
 
-/// It was never asked again.
+/// A connection that was refused while it was made does not connect again by itself.
 #[tokio::test]
 #[ignore = "needs redis-server"]
 async fn a_redis_that_has_refused_a_password_is_found_again_when_it_takes_it() {
@@ -375,7 +374,7 @@ async fn a_redis_without_room_takes_no_session_and_one_that_refuses_is_not_ready
     assert_eq!(created.unwrap(), Outcome::Full);
     assert!(store.is_full() && store.is_ready());
     session.advance(&store).await;
-    // All of it is, and no session has to find that out.
+    // All memory is used: the store finds that out without a session's call.
     set("1");
     until("it is known to refuse", || !store.is_ready()).await;
     let asked = bagtrack_sessions::clock::now();
@@ -391,7 +390,7 @@ async fn a_redis_without_room_takes_no_session_and_one_that_refuses_is_not_ready
     session.advance(&store).await;
 }
 
-/// The first session found that out.
+/// The store has to know this before the first session is opened.
 #[tokio::test]
 #[ignore = "needs redis-server"]
 async fn a_redis_that_does_not_say_how_full_it_is_is_not_ready() {

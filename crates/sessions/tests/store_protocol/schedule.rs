@@ -1,9 +1,9 @@
-//! Random schedules: what happens next, by the numbers of a list, and what has to hold of each answer.
+//! Random schedules: each number of a list says what happens next, and each answer is checked.
 //!
-//! What has to hold: an answer is that of some history of frames, and to the frame that was sent; an answer that says
-//! `Checkpoint: N` is never taken back up to frame N, neither by the answer to a later request, nor by a 409 to a later
-//! request that asks for an earlier frame; a session that was ended does not come back, and answers nothing that is
-//! sent to another one with its id; and without failures the client gets to the end.
+//! What has to hold: an answer is that of some history of frames, and belongs to the frame that was sent; an answer
+//! that says `Checkpoint: N` is never taken back up to frame N, neither by the answer to a later request, nor by a 409
+//! to a later request that asks for an earlier frame; a session that was ended does not come back, and answers nothing
+//! that is sent to another one with its id; and without failures the client gets to the end.
 
 use crate::hostile::HostileStore;
 use crate::memory::Records;
@@ -29,7 +29,7 @@ struct World {
     ended: u64,
     /// The longest history up to a checkpoint that an answer has told.
     promised: History,
-    /// Why the last request was refused, for whoever reads that a test has failed.
+    /// Why the last request was refused, for the message of a failed test.
     last_refusal: String,
 }
 
@@ -64,7 +64,7 @@ impl World {
         self.store.settles().await;
     }
 
-    /// Asks, with a store that answers at once.
+    /// Sends a request, and lets the store answer all calls.
     async fn finish_asking(&mut self, replica: usize, asked: Asked) {
         self.ask(replica, asked).await;
         self.settle().await;
@@ -98,7 +98,7 @@ impl World {
             self.replicas[replica].stream = Some(place.clone());
         }
         if request.ended < self.ended {
-            // Of what the client has ended since.
+            // The answer is of a session that the client has ended since.
             return;
         }
         match answer {
@@ -129,7 +129,7 @@ impl World {
                 let history = found.expect(&message).clone();
                 if arrives {
                     self.next[sender] = frame + 1;
-                    // A stored answer tells nothing of the frames after its own.
+                    // A stored answer says nothing about the frames after its own.
                     let told = checkpoint.min(history.len());
                     if told > self.promised.len() {
                         self.promised = history[..told].to_vec();
@@ -154,10 +154,10 @@ impl World {
         }
     }
 
-    /// Whether an answer after this history takes no other back.
+    /// Whether an answer with this history takes back no frame that was promised.
     fn keeps_promises(&self, request: &Request, history: &[u8], checkpoint: usize) -> bool {
-        // What was promised when the request was sent, and what this answer promises. Of what lies between, a late
-        // answer may tell what another has replaced.
+        // Compares up to what was promised when the request was sent, or what this answer promises. Between the two, a
+        // late answer may tell frames that others have replaced.
         let told = request.promised.max(checkpoint).min(history.len());
         let shared = told.min(self.promised.len());
         let mut promised = request.promised.min(self.promised.len());
@@ -181,12 +181,12 @@ impl World {
         let had = self.store.has(ID);
         self.store.run(pick);
         if had && !self.store.has(ID) {
-            // The client waits for its answer that the session has ended, and for no other opening of it.
+            // The client waits only for the answer that the session has ended, and for no opening of it.
             self.give_openings_up().await;
         }
     }
 
-    /// The client no longer waits for what would open a session that has ended meanwhile.
+    /// The client gives up its requests that would open a session which has ended meanwhile.
     async fn give_openings_up(&mut self) {
         for replica in &mut self.replicas {
             if replica.opens {
@@ -197,7 +197,7 @@ impl World {
         self.store.settles().await;
     }
 
-    /// Does what the number says, if that is possible now.
+    /// Does the step of this number, if it is possible now.
     async fn step(&mut self, choice: u16) {
         let before = self.ended;
         let (replica, choice) = (usize::from(choice % 2), choice / 2);
@@ -277,7 +277,7 @@ impl World {
         }
         self.store.settles().await;
         if self.is_open && !self.store.has(ID) {
-            // It was ended, and the client did not get to know.
+            // The session was ended, but the answer to the client was lost.
             self.end();
         }
         for attempt in 0..20 * FRAMES as usize {
@@ -288,7 +288,7 @@ impl World {
                 true => Asked::Frame(0, self.next[0]),
                 false => Asked::Open(self.ended),
             };
-            // With checkpoints a session has to stay at one replica.
+            // If states are stored at checkpoints only, a session has to stay at one replica to get on.
             let replica = if self.every == 1 { attempt % 2 } else { 0 };
             self.finish_asking(replica, asked).await;
         }

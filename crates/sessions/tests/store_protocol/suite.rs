@@ -1,4 +1,4 @@
-//! What every store does, whatever keeps its records.
+//! Tests that every store has to pass, whatever keeps its records.
 
 use crate::hostile::HostileStore;
 use bagtrack_sessions::{
@@ -139,7 +139,7 @@ async fn whoever_lacks_frames_takes_over_at_the_checkpoint(store: &dyn SessionSt
     assert!(is_committed(
         &stored.commit(taken.version, 1, Some(b"new"), false).await
     ));
-    // The first one goes on from its own copy no more.
+    // The first replica cannot go on from its own copy any more.
     let late = stored.commit(newest, 4, Some(b"old"), false).await;
     assert_eq!(told(late).state, b"new");
 }
@@ -172,7 +172,7 @@ async fn an_ended_session_does_not_come_back(store: &dyn SessionStore) {
     let created = store.create(stored.name.id, &same).await.unwrap();
     assert_eq!(created, Outcome::Tombstoned);
     assert_eq!(store.load(stored.name.id).await.unwrap(), None);
-    // Another session may have the id, and is not ended under the name of the first.
+    // Another session may get the id. Ending the first one again does not end it.
     let other = record(stored.name.incarnation ^ 1, 0, b"other");
     let created = store.create(stored.name.id, &other).await.unwrap();
     assert!(is_committed(&created));
@@ -188,7 +188,7 @@ async fn an_ended_session_does_not_come_back(store: &dyn SessionStore) {
 }
 
 async fn the_first_secret_stays(store: &dyn SessionStore) {
-    // No text, so that none is made of it on the way.
+    // These bytes are no UTF-8, so a store that treats secrets as text would change them.
     let first: [u8; 32] = std::array::from_fn(|i| 255 - i as u8);
     assert_eq!(store.secret(first).await.unwrap(), first);
     assert_eq!(store.secret([2; 32]).await.unwrap(), first);

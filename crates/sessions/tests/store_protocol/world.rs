@@ -16,10 +16,10 @@ use uuid::Uuid;
 pub const LONG: Duration = Duration::from_secs(3600);
 pub const ID: Uuid = Uuid::from_u128(1);
 
-/// What is asked of a replica.
+/// A request to a replica.
 #[derive(Debug, Clone)]
 pub enum Asked {
-    /// This frame, as the client (0) or its rival (1) sends it.
+    /// A frame by its number, as the client (0) or its rival (1) sends it.
     Frame(u8, u64),
     /// The client's next frame, over the replica's stream.
     Streamed(Arc<StreamPlace>),
@@ -41,7 +41,7 @@ pub struct Request {
 
 #[derive(Debug)]
 pub enum Answer {
-    /// Where the session with this seed stands, and its checkpoint.
+    /// The answer to a frame: the session's seed, the estimates, and the checkpoint.
     Tracked(u64, Estimates, u64),
     /// The number of the next frame.
     Expected(u64),
@@ -50,7 +50,7 @@ pub enum Answer {
     /// The session with this seed is open.
     Born(u64),
     Ended,
-    /// Why there is none.
+    /// The refusal's text.
     Nothing(String),
 }
 
@@ -67,7 +67,7 @@ pub fn service(store: Option<Arc<dyn SessionStore>>, store_every: u64) -> Sessio
     service_by(Clock::default(), store, store_every)
 }
 
-/// The same, whose sessions expire by this clock.
+/// A replica whose sessions expire by this clock.
 pub fn service_by(
     clock: Clock,
     store: Option<Arc<dyn SessionStore>>,
@@ -76,7 +76,7 @@ pub fn service_by(
     SessionService::new(parts(clock, store, store_every))
 }
 
-/// What such a replica is made of.
+/// The parts of such a replica.
 pub fn parts(clock: Clock, store: Option<Arc<dyn SessionStore>>, store_every: u64) -> ServiceParts {
     let lease = Lease {
         first: LONG,
@@ -126,7 +126,7 @@ fn seed_of(session: &Session) -> u64 {
     session.opening().request[0].into()
 }
 
-/// What the service answers.
+/// Sends a request to the service, and returns its answer.
 pub async fn answer(service: &SessionService, asked: &Asked) -> Answer {
     match asked {
         Asked::Frame(sender, number) => {
@@ -140,7 +140,7 @@ pub async fn answer(service: &SessionService, asked: &Asked) -> Answer {
                 Err(error) => return Answer::Nothing(error.to_string()),
             };
             let number = session.latest_frame() + 1;
-            // With its number, for another picture than the frame's own would be a frame of no history.
+            // With its number: without one, the picture might be taken as another frame, and fit no history.
             let mut batch = FrameBatch::posted(Some(number), vec![picture(0, number).into()], None);
             batch.stream = Some(place.clone());
             track(service, batch).await
@@ -199,7 +199,7 @@ async fn open_stream(service: &SessionService) -> Result<Answer, ActError> {
 /// The answers that were given, in their order.
 pub type Answers = Arc<Mutex<Vec<(usize, Request, Answer)>>>;
 
-/// Begins with a request at a replica.
+/// Starts a request at a replica, which adds its answer to `answers`.
 pub fn begin(
     store: &HostileStore,
     answers: &Answers,
