@@ -41,14 +41,14 @@ pub enum AccessError {
     ShortSecret,
 }
 
-/// What lets somebody in.
+/// What a request was let in with.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Credential {
     /// Whose sessions it opens.
     pub owner: Owner,
-    /// The digest of the API key that it is, or that a session token was made with.
+    /// The digest of the presented API key, or of the one with which the session token was made.
     pub key: Option<blake3::Hash>,
-    /// When it ends, where it does.
+    /// When the credential ends; `None` for an API key.
     pub until: Option<SystemTime>,
 }
 
@@ -57,18 +57,18 @@ pub struct Credential {
 pub struct Access {
     /// The API keys.
     pub keys: ApiKeys,
-    /// What checks the tokens of an identity provider, where one is named.
+    /// The verifier of an identity provider's tokens, where the settings name a provider.
     #[cfg(feature = "jwt")]
     pub jwt: Option<TokenVerifier>,
-    /// What session tokens are signed with.
+    /// The keys with which session tokens are signed.
     pub tokens: TokenKeys,
-    /// What snapshots are signed with.
+    /// The keys with which snapshots are signed.
     pub snapshots: Arc<MacKeys>,
 }
 
 impl Access {
-    /// The keys and secrets of these settings, for a service that listens on this address. It may block: keys of an
-    /// issuer are read `now`.
+    /// The keys and secrets of these settings, for a service that listens on this address. It may block, since it reads
+    /// the keys of the issuer.
     ///
     /// # Errors
     /// See [`AccessError`].
@@ -117,7 +117,7 @@ impl Access {
         self.keys.are_needed()
     }
 
-    /// Whether this still lets somebody in: its key is among the keys, and its time has not come.
+    /// Whether a credential is still good: its API key still exists, and it has not ended by `now`.
     pub fn holds(&self, credential: &Credential, now: SystemTime) -> bool {
         let Credential { owner, key, until } = credential;
         if until.is_some_and(|until| now >= until) {
@@ -137,7 +137,8 @@ impl Access {
         }
     }
 
-    /// The session that this session token is good for, and what it lets in with; if it was made here and still holds.
+    /// The session that this session token is good for, and its credential. `None` unless the keys of this service
+    /// signed the token and it is still good.
     pub fn session_token(&self, text: &str, now: SystemTime) -> Option<(SessionName, Credential)> {
         let token = self.tokens.verify(text, now, |owner| self.keys.of(owner))?;
         let credential = Credential {
@@ -149,7 +150,7 @@ impl Access {
             .then_some((token.session, credential))
     }
 
-    /// What this key, or this token of an identity provider, lets in with.
+    /// The credential of an API key or of an identity provider's token.
     ///
     /// # Errors
     /// See [`NotIdentified`].
@@ -182,10 +183,10 @@ impl Access {
 /// Why nobody is identified.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NotIdentified {
-    /// There is no such key.
+    /// The service has no such key, and takes no tokens of an identity provider.
     #[error("it is no API key of this service")]
     Key,
-    /// It is a token that is not taken.
+    /// The token is not taken.
     #[cfg(feature = "jwt")]
     #[error(transparent)]
     Token(#[from] TokenError),

@@ -1,7 +1,7 @@
 //! Which hosts requests may name.
 //!
-//! A page can make its own host name resolve to this machine. To the browser it is of the same origin then, and may
-//! call whatever listens there. What it cannot do is name another host.
+//! A malicious page can make its own host name resolve to this machine (DNS rebinding). The browser then treats the
+//! service as the page's own origin, and lets the page call it. But such requests still name the page's host.
 
 use bagtrack_config::Config;
 use std::net::IpAddr;
@@ -9,17 +9,17 @@ use std::net::IpAddr;
 /// The hosts that requests may name.
 #[derive(Debug, Clone, Copy)]
 pub enum AllowedHosts<'a> {
-    /// Any.
+    /// Any host.
     All,
     /// The names and addresses of this machine.
     Loopback,
-    /// These, with any port or with the one that is given.
+    /// These hosts; one that is listed without a port may be named with any.
     Listed(&'a [String]),
 }
 
 impl<'a> AllowedHosts<'a> {
-    /// Those of the settings. A service that only this machine can reach, that needs no key, and that no proxy is said
-    /// to be before, is for this machine.
+    /// The hosts that the settings allow. Where they list none, only names of this machine are allowed if the service
+    /// listens on loopback, needs no key, and has no trusted proxies.
     pub fn of(config: &'a Config, needs_key: bool) -> Self {
         let hosts = &config.access.allowed_hosts;
         let is_local = config.listen.ip().is_loopback() && config.limits.trusted_proxies.is_empty();
@@ -30,7 +30,7 @@ impl<'a> AllowedHosts<'a> {
         }
     }
 
-    /// Whether `host` is one of them. Requests of HTTP/1.0 may name none; browsers do not send them.
+    /// Whether requests may name `host`. It is empty for a request of HTTP/1.0 without a host, which no browser sends.
     pub fn have(&self, host: &str) -> bool {
         match self {
             Self::All => true,
@@ -50,7 +50,7 @@ fn is_loopback(host: &str) -> bool {
         || address.is_ok_and(|address| address.to_canonical().is_loopback())
 }
 
-/// Whether `host` is the allowed one, which may leave the port open.
+/// Whether `host` is the allowed one. If that has no port, any port fits.
 fn is_host(allowed: &str, host: &str) -> bool {
     allowed.eq_ignore_ascii_case(host) || allowed.eq_ignore_ascii_case(without_port(host))
 }

@@ -24,7 +24,7 @@ pub enum KeysError {
     Entry {
         /// Where the entry stands.
         place: String,
-        /// Which one it is, counted from 1.
+        /// The number of the entry there, counted from 1.
         number: usize,
     },
     /// The file cannot be read.
@@ -38,7 +38,7 @@ pub enum KeysError {
     /// The file has no key: nobody could use the service.
     #[error("{0} (--api-keys-file, BAGTRACK_API_KEYS_FILE) has no key")]
     Empty(PathBuf),
-    /// One key is two clients'.
+    /// Two clients have the same key.
     #[error(
         "the clients {0} and {1} have the same API key (--api-keys, --api-keys-file): each needs a key of its own, which \
          tells whose a session is"
@@ -52,7 +52,7 @@ struct ApiKey {
     digest: blake3::Hash,
 }
 
-/// The API keys. Clones are the same keys.
+/// The API keys. Clones share them.
 #[derive(Debug, Clone)]
 pub struct ApiKeys(Arc<Inner>);
 
@@ -76,7 +76,7 @@ impl ApiKeys {
             file: file.map(Path::to_owned),
             current: RwLock::default(),
         }));
-        // A file that can be read once only, like a pipe, will do for the start.
+        // At the start the file may be one that can be read only once, like a pipe.
         keys.read(&|path| std::fs::read_to_string(path))?;
         Ok(keys)
     }
@@ -84,7 +84,7 @@ impl ApiKeys {
     /// Reads the file again. Returns the number of keys.
     ///
     /// # Errors
-    /// See [`KeysError`]. The keys are then as before.
+    /// See [`KeysError`]. The keys then stay as they were.
     pub fn reload(&self) -> Result<usize, KeysError> {
         self.read(&read_regular)
     }
@@ -96,7 +96,7 @@ impl ApiKeys {
                 path: path.clone(),
                 source,
             })?;
-            // Some editors begin a text with a mark that is not seen.
+            // Some editors begin a text with a byte-order mark.
             let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
             let lines = text.lines().map(str::trim);
             let lines = lines.filter(|line| !line.is_empty() && !line.starts_with('#'));
@@ -122,7 +122,7 @@ impl ApiKeys {
     pub fn owner(&self, presented: &[u8]) -> Option<(Owner, blake3::Hash)> {
         let digest = blake3::hash(presented);
         let mut owner = None;
-        // All are compared, so the time does not tell which one it is.
+        // All keys are compared, so the time does not tell which one fits.
         for key in self.current().iter() {
             if key.digest == digest {
                 owner = Some((key.owner.clone(), digest));
@@ -139,13 +139,14 @@ impl ApiKeys {
     }
 
     fn current(&self) -> Arc<[ApiKey]> {
-        // Nothing panics while it is held.
+        // Nothing panics while the lock is held.
         let current = self.0.current.read();
         current.unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
-/// The text of a file that is none of those which may never end: a pipe nobody writes to would stop all later reloads.
+/// The text of a regular file. Others are refused: a pipe to which nobody writes would block this and all later
+/// reloads.
 pub(super) fn read_regular(path: &Path) -> io::Result<String> {
     match std::fs::metadata(path)?.is_file() {
         true => std::fs::read_to_string(path),
@@ -211,7 +212,7 @@ mod tests {
             "0123456789abcdef",
             ":0123456789abcdef",
             "a b:0123456789abcdef",
-            // It would be taken for a token.
+            // This key would be taken for a session token.
             "me:bagtrack-session.0123456789abcdef",
         ] {
             let message = load(wrong).unwrap_err().to_string();

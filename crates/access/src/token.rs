@@ -1,9 +1,8 @@
 //! Session tokens: what a web page gets in place of an API key.
 //!
-//! A token holds the id of its session and the random number that this was opened with, the moment at which it ends,
-//! the name of the key that made it, and a code of all of these and of that key under a secret of the service. So
-//! nothing is stored, and it ends with its session (another one may have the id later), its time, its key or the
-//! secret.
+//! A token holds the session's id and incarnation, the moment at which the token ends, the name of the API key that
+//! made it, and a code of all of these and of the key under a secret of the service. So the service stores nothing, and
+//! the token ends with its session (another one may get the id later), its time, its key or the secret.
 //!
 //! Layout, as base64url after [`PREFIX`]: 16 bytes of id, 8 of the incarnation, 8 of seconds since 1970 (both big
 //! endian), 32 of code, and the name.
@@ -14,7 +13,7 @@ use base64::prelude::BASE64_URL_SAFE_NO_PAD;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use uuid::Uuid;
 
-/// What every token begins with, and no usual key.
+/// Every token begins with this, and no API key may.
 pub const PREFIX: &str = "bagtrack-session.";
 const CONTEXT: &str = "bagtrack 2026-11 session token";
 const WITH_KEY_CONTEXT: &str = "bagtrack 2026-11 session token of an API key";
@@ -25,27 +24,27 @@ const TIME_BYTES: usize = 8;
 /// What a token says.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SessionToken {
-    /// The only session that it is good for.
+    /// The only session that the token is good for.
     pub session: SessionName,
-    /// Whose session that is.
+    /// The owner of that session.
     pub owner: Owner,
-    /// The digest of the API key that made it. None where an identity provider's token did, where no key was needed, or
-    /// where a version made it that wrote no keys into tokens.
+    /// The digest of the API key with which the token was made. `None` where it was made with an identity provider's
+    /// token, without a key, or by a version that wrote no keys into tokens.
     pub key: Option<blake3::Hash>,
-    /// When it ends, in whole seconds.
+    /// When the token ends, in whole seconds.
     pub expires: SystemTime,
 }
 
 /// The keys of tokens.
 #[derive(Debug)]
 pub struct TokenKeys {
-    /// Of tokens that no API key made.
+    /// Keys for tokens that were made without an API key.
     plain: MacKeys,
     with_key: MacKeys,
 }
 
 impl TokenKeys {
-    /// Keys from these secrets; a random one without any.
+    /// Keys from these secrets; a random key where there are none.
     pub fn new<S: AsRef<[u8]>>(secrets: &[S]) -> Self {
         Self {
             plain: MacKeys::new(CONTEXT, secrets),
@@ -72,7 +71,7 @@ impl TokenKeys {
     }
 
     /// The token of a text, if it is one that these keys signed and that has not ended by `now`. `keys_of` gives the
-    /// digests of an owner's API keys: one of them has made it, or none at all.
+    /// digests of an owner's API keys; the token must have been made with one of these, or without a key.
     pub fn verify(
         &self,
         text: &str,

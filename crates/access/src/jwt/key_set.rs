@@ -7,17 +7,17 @@ use serde::Deserialize;
 /// Why a text is no key set.
 #[derive(Debug, thiserror::Error)]
 pub enum KeySetError {
-    /// It has another form.
+    /// The text has another form.
     #[error("it is no JSON Web Key Set (RFC 7517): {0}")]
     Form(#[from] serde_json::Error),
-    /// It has no key that signs tokens.
+    /// The set has no key that can check signatures.
     #[error(
         "it has no public key of RSA, of the curves P-256 and P-384, or of Ed25519, to check signatures with"
     )]
     Empty,
 }
 
-/// A public key, and what it signs with.
+/// A public key, and the algorithms whose signatures it may check.
 #[derive(Debug)]
 pub(super) struct PublicKey {
     id: Option<String>,
@@ -51,7 +51,8 @@ impl KeySet {
         self.0.len()
     }
 
-    /// The key of a token, whose header names it, or names none where there is one alone.
+    /// The key that checks a token: the one that the token's header names or, if the header names none, the only one
+    /// for `algorithm`.
     pub(super) fn find(&self, id: Option<&str>, algorithm: Algorithm) -> Option<&PublicKey> {
         let mut fitting = self.0.iter().filter(|key| {
             let is_named = id.is_none() || key.id.as_deref() == id;
@@ -63,7 +64,7 @@ impl KeySet {
 }
 
 impl PublicKey {
-    /// The key, where it checks signatures. A secret that both sides share does not: whoever reads it could sign.
+    /// The key, if it is a public key for signatures. Shared secrets are refused: whoever reads one could sign.
     fn of(key: &Jwk) -> Option<Self> {
         use Algorithm::{ES256, ES384, EdDSA, PS256, PS384, PS512, RS256, RS384, RS512};
         let signs = matches!(

@@ -10,7 +10,7 @@ use ureq::tls::{RootCerts, TlsConfig};
 
 /// How long one answer may take.
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// The most bytes of one: a key set has some thousand.
+/// Most bytes of one answer; a key set has some thousand.
 const MAX_BYTES: u64 = 1 << 20;
 
 /// Why the keys cannot be read.
@@ -31,16 +31,17 @@ impl SourceError {
     }
 }
 
-/// Where keys come from. It may block.
+/// Where the keys of an issuer come from.
 pub trait KeySource: fmt::Debug + Send + Sync {
-    /// The text of the key set as it is now.
+    /// Reads the text of the key set. It may block.
     ///
     /// # Errors
-    /// It cannot be read.
+    /// The key set cannot be read.
     fn read(&self) -> Result<String, SourceError>;
 }
 
-/// What a setting names: an address, or else a file. Without it, what the issuer names.
+/// The source that the setting `keys` names: an address, or else a file. Without the setting, the key set that the
+/// issuer names.
 pub(super) fn named(keys: Option<&str>, issuer: &str) -> Arc<dyn KeySource> {
     match keys {
         Some(url) if is_url(url) => Arc::new(Url(url.to_owned())),
@@ -99,7 +100,7 @@ impl KeySource for Issuer {
     }
 }
 
-/// What asks for addresses. It trusts whom the machine trusts.
+/// The HTTP client, which trusts the certificates that the machine trusts.
 fn agent() -> ureq::Agent {
     let provider = Arc::new(rustls::crypto::ring::default_provider());
     let tls = TlsConfig::builder()

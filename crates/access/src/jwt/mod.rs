@@ -5,9 +5,10 @@
 //! a [`KeySet`](key_set::KeySet), which comes from a [`KeySource`].
 //!
 //! What can go wrong: a token is signed with a key that the service may know but the issuer did not mean (only public
-//! keys count, and each with its own algorithms); the issuer changes its keys (they are read again when none of
-//! them has signed a token, and every ten minutes); it is out of reach (the keys before stay, and only tokens of others
-//! wait); somebody invents tokens to have them read again and again (not twice in half a minute).
+//! keys count, and each with its own algorithms); the issuer changes its keys (they are read again when none of them
+//! has signed a token, and every ten minutes); the issuer is out of reach (the former keys stay, and only tokens that
+//! none of them signed wait); somebody invents tokens to make the service read the keys again and again (it does so at
+//! most every half minute).
 
 mod key_set;
 mod key_source;

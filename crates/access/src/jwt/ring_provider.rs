@@ -1,4 +1,4 @@
-//! Checks signatures with ring, for the crate `jsonwebtoken`. The service has TLS by it too.
+//! Checks signatures with `ring`, for the crate `jsonwebtoken`. The service's TLS uses `ring` too.
 
 use jsonwebtoken::crypto::{CryptoProvider, JwtVerifier, KeyUtils};
 use jsonwebtoken::errors::ErrorKind;
@@ -13,13 +13,13 @@ static PROVIDER: CryptoProvider = CryptoProvider {
         let (algorithm, key) = (*algorithm, key.clone());
         Ok(Box::new(SignatureVerifier { algorithm, key }))
     },
-    // Public keys are read as they are.
+    // The verifier below reads public keys without these utilities.
     key_utils: KeyUtils::new_unimplemented(),
 };
 
-/// Makes this what checks signatures in this process.
+/// Makes this the provider of signature checks in this process.
 pub(super) fn install() {
-    // Installed twice, it is the same.
+    // Installing it twice is no error: it is the same provider.
     let _ = PROVIDER.install_default();
 }
 
@@ -50,7 +50,7 @@ impl JwtVerifier for SignatureVerifier {
     }
 }
 
-/// RSA keys have at least 2,048 bits.
+/// The parameters for an algorithm of RSA, with keys of 2,048 to 8,192 bits.
 fn rsa(algorithm: Algorithm) -> Option<&'static RsaParameters> {
     Some(match algorithm {
         Algorithm::RS256 => &ring_signature::RSA_PKCS1_2048_8192_SHA256,

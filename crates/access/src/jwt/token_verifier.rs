@@ -12,17 +12,18 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime};
 
-/// What the clocks of issuer and service may be apart.
+/// How far the clocks of issuer and service may be apart.
 const LEEWAY: Duration = Duration::from_secs(60);
-/// After so long the keys are read again: an issuer takes one back.
+/// After this time the keys are read again, since the issuer may have revoked one.
 const MAX_AGE: Duration = Duration::from_secs(600);
-/// After so long without a try, whoever comes waits for it: a key may have been taken back while nobody came.
+/// If the keys were not asked for in this time, a token waits until they are: one may have been revoked while no token
+/// came.
 const MAX_UNTRIED: Duration = Duration::from_secs(1200);
-/// Not before this time they are read again for a token that none of them has signed.
+/// Least time between two readings for the sake of tokens that none of the keys has signed.
 const MIN_AGE: Duration = Duration::from_secs(30);
-/// Tokens whose signature need not be checked again.
+/// Most tokens that are remembered, so that their signatures need not be checked again.
 const MAX_CHECKED: usize = 1024;
-/// What the names of such clients begin with. No API key has a name like this.
+/// The names of clients with such tokens begin with this. Names of API keys have no colon.
 const PREFIX: &str = "jwt:";
 /// The longest subject (OpenID Connect Core 1.0, section 2).
 const MAX_OWNER_BYTES: usize = 255;
@@ -39,7 +40,7 @@ pub enum JwtError {
     /// The keys cannot be read.
     #[error("the keys of --jwt-issuer cannot be read (--jwt-keys, BAGTRACK_JWT_KEYS): {0}")]
     Source(#[from] SourceError),
-    /// What was read is no key set.
+    /// The text that was read is no key set.
     #[error("the keys of --jwt-issuer (--jwt-keys, BAGTRACK_JWT_KEYS) cannot be used: {0}")]
     Keys(#[from] KeySetError),
 }
@@ -47,19 +48,19 @@ pub enum JwtError {
 /// Why a token is not taken, for whoever sent it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TokenError {
-    /// It has another form.
+    /// The text has another form.
     #[error("it is no API key of this service, and no JSON Web Token")]
     Form,
-    /// Its algorithm is none of a public key.
+    /// The token's algorithm is not one of public keys.
     #[error("the token is signed with {0:?}, not with the issuer's key")]
     Algorithm(Algorithm),
     /// Its header says that what this service does not know has to be understood (RFC 7515, section 4.1.11).
     #[error("the token's header has critical parameters (`crit`), and this service knows none")]
     Critical,
-    /// Nobody knows the key that it names.
+    /// The issuer has no key with the name and the algorithm of the token.
     #[error("the issuer has no key of the name and algorithm that the token says")]
     UnknownKey,
-    /// It was changed, or another key has signed it.
+    /// The token was changed, or another key has signed it.
     #[error("the token's signature is wrong")]
     Signature,
     /// Its time is over.
@@ -68,10 +69,10 @@ pub enum TokenError {
     /// Its time has not come.
     #[error("the token is not valid yet")]
     Early,
-    /// It is another issuer's.
+    /// The token is of another issuer.
     #[error("the token's issuer (`iss`) is not the one of this service")]
     Issuer,
-    /// It is for somebody else.
+    /// The token is for other audiences.
     #[error("the token is not for this service (`aud`)")]
     Audience,
     /// A claim is missing, or is not what it has to be.
@@ -84,11 +85,11 @@ pub enum TokenError {
 pub struct Identity {
     /// The client.
     pub owner: Owner,
-    /// From when the token is no longer taken: its end, and the leeway of clocks that differ.
+    /// From then on the token is refused: its end plus a leeway of one minute for clocks that differ.
     pub expires: SystemTime,
 }
 
-/// Checks the tokens of one issuer. Clones are the same.
+/// Checks the tokens of one issuer. Clones share the keys.
 #[derive(Debug, Clone)]
 pub struct TokenVerifier(Arc<Inner>);
 
@@ -99,23 +100,23 @@ struct Inner {
     owner_claim: String,
     source: Arc<dyn KeySource>,
     known: Mutex<Known>,
-    /// Held by whoever reads the keys, for whom those wait that need other keys.
+    /// Held while the keys are read. Tokens that need newer keys wait for it.
     reading: tokio::sync::Mutex<()>,
 }
 
-/// What is known at a time.
+/// The keys, and the tokens that they have signed.
 #[derive(Debug)]
 struct Known {
     keys: Arc<KeySet>,
     /// When the keys were asked for last, and when they came last.
     asked: SystemTime,
     came: SystemTime,
-    /// By the digests of tokens that these keys have signed.
+    /// Identities of tokens that these keys have signed, by the tokens' digests.
     checked: HashMap<blake3::Hash, Identity>,
 }
 
 impl TokenVerifier {
-    /// Checks tokens as these settings say, with keys that are read now; none where no issuer is named. It may block.
+    /// A verifier by these settings, whose keys are read at once; `None` where no issuer is named. It may block.
     ///
     /// # Errors
     /// See [`JwtError`].
@@ -132,7 +133,7 @@ impl TokenVerifier {
         Self::with_source(config, source, now).map(Some)
     }
 
-    /// The same, with keys from elsewhere.
+    /// A verifier by these settings, with keys from `source`. It may block.
     ///
     /// # Errors
     /// See [`JwtError`].
@@ -162,8 +163,8 @@ impl TokenVerifier {
         })))
     }
 
-    /// Whom this token speaks for. The keys are read again where they are old, beside this call, and where they have
-    /// not signed it.
+    /// Whom this token speaks for. Keys that are old are read again in the background. If none of the keys has signed
+    /// the token, they are read again first.
     ///
     /// # Errors
     /// See [`TokenError`].
@@ -176,12 +177,12 @@ impl TokenVerifier {
         if since(asked, now) >= MAX_UNTRIED {
             self.read_keys(&keys, now).await;
         } else if since(came, now) >= MAX_AGE && self.is_due(&keys, now) {
-            // An issuer that is away, or hangs, holds nobody up whose key is known.
+            // An issuer that is away or hangs must not delay tokens whose key is known.
             let (verifier, keys) = (self.clone(), keys.clone());
             tokio::spawn(async move { verifier.read_keys(&keys, now).await });
         }
         let identity = self.look_up(token, &header, now);
-        // The key may be new, or another of the same name.
+        // The issuer may have a new key, or another one under the same name.
         let (Err(TokenError::UnknownKey) | Err(TokenError::Signature)) = identity else {
             return identity;
         };
@@ -209,22 +210,22 @@ impl TokenVerifier {
         }
         let identity = self.check(token, header, &keys, now)?;
         let mut known = self.known();
-        // Keys that came meanwhile may not have signed it.
+        // Keys that were read meanwhile may not have signed the token.
         if Arc::ptr_eq(&known.keys, &keys) {
             known.remember(digest, identity.clone(), now);
         }
         Ok(identity)
     }
 
-    /// Whether a client of this name comes with such tokens.
+    /// Whether a client of this name is one with such tokens.
     pub fn may_have(&self, owner: &Owner) -> bool {
         owner.name().is_some_and(|name| name.starts_with(PREFIX))
     }
 
-    /// Reads the keys again. Gives how many there are. It may block.
+    /// Reads the keys again, and returns their number. It may block.
     ///
     /// # Errors
-    /// See [`JwtError`]. The keys are then as before.
+    /// See [`JwtError`]. The keys then stay as they were.
     pub fn reload(&self, now: SystemTime) -> Result<usize, JwtError> {
         self.known().asked = now;
         let keys = KeySet::parse(&self.0.source.read()?)?;
@@ -235,13 +236,13 @@ impl TokenVerifier {
         Ok(count)
     }
 
-    /// Whether the keys may be asked for: those that are known are the ones `seen`, and nobody has tried a moment ago.
+    /// Whether the keys may be read: they are still those `seen`, and the last try is at least [`MIN_AGE`] ago.
     fn is_due(&self, seen: &Arc<KeySet>, now: SystemTime) -> bool {
         let known = self.known();
         Arc::ptr_eq(&known.keys, seen) && since(known.asked, now) >= MIN_AGE
     }
 
-    /// Reads the keys again, unless somebody else has done so since they were `seen`, or tried a moment ago.
+    /// Reads the keys again, unless another call has replaced those `seen`, or has tried less than [`MIN_AGE`] ago.
     async fn read_keys(&self, seen: &Arc<KeySet>, now: SystemTime) {
         let _reading = self.0.reading.lock().await;
         if !self.is_due(seen, now) {
@@ -277,7 +278,7 @@ impl TokenVerifier {
         validation.set_issuer(&[&self.0.issuer]);
         validation.set_audience(&self.0.audience);
         validation.set_required_spec_claims(&["exp", "iss", "aud"]);
-        // The time is the service's.
+        // The library would compare with the system's clock, and not with `now`.
         validation.validate_exp = false;
         let claims = decode::<Map<String, Value>>(token, &key.key, &validation);
         let claims = claims.map_err(|error| refusal(error.kind()))?.claims;
@@ -289,7 +290,7 @@ impl TokenVerifier {
         claims: &Map<String, Value>,
         now: SystemTime,
     ) -> Result<Identity, TokenError> {
-        // The library takes an array that has it, too.
+        // The library would also take an array that contains the issuer.
         if claims.get("iss").and_then(Value::as_str) != Some(&self.0.issuer) {
             return Err(TokenError::Issuer);
         }
@@ -313,7 +314,7 @@ impl TokenVerifier {
     }
 
     fn known(&self) -> MutexGuard<'_, Known> {
-        // Nothing panics while it is held.
+        // Nothing panics while the lock is held.
         self.0.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -330,12 +331,13 @@ impl Known {
     }
 }
 
-/// The time since a moment; none where the clock was set back.
+/// The time since a moment; zero where the clock was set back.
 fn since(moment: SystemTime, now: SystemTime) -> Duration {
     now.duration_since(moment).unwrap_or_default()
 }
 
-/// The moment of a claim in seconds since 1970, where it is there. A leeway can be added to it.
+/// The moment of a claim in seconds since 1970; `None` where the token has no such claim. [`LEEWAY`] can be added to
+/// the moment.
 fn moment(claims: &Map<String, Value>, claim: &str) -> Result<Option<SystemTime>, TokenError> {
     let Some(value) = claims.get(claim) else {
         return Ok(None);
