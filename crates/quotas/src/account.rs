@@ -1,7 +1,7 @@
 //! What one client has in use, against its quotas.
 //!
-//! Quotas are shares of what the service has: sessions and their bytes, requests in flight, bytes of uploads, and
-//! frames and requests a second.
+//! Quotas are shares of what the service has: sessions and their bytes, requests in flight, streams, bytes of uploads,
+//! and frames and requests a second.
 
 use super::clients::{Client, Holdings};
 use super::rates::{self, FrameRate, Rate, RateExceeded};
@@ -44,23 +44,24 @@ impl Quotas {
 #[derive(Debug)]
 pub struct Account {
     pub(super) client: Client,
-    /// That of the key, where this is a page's. It counts the frames.
+    /// The account of the API key, where this is the account of a page with a token of that key. The key's account
+    /// counts the frames.
     key: Option<Arc<Account>>,
     flow: Flow,
     pub(super) quotas: Quotas,
     pub(super) all: Holdings,
     pub(super) held: Holdings,
-    /// They are known as long as one of their clients is.
+    /// Keeps the networks' holdings known as long as one of their clients is.
     _networks: Vec<Arc<Holdings>>,
     requests: Arc<Semaphore>,
     videos: VideoPlaces,
     messages: Arc<MessageRate>,
     asked: DefaultDirectRateLimiter,
     handshakes: DefaultDirectRateLimiter,
-    /// Whose handshake is next.
+    /// Held by the handshake that is next, so that others wait in order of arrival.
     next_handshake: tokio::sync::Mutex<()>,
     frames: Option<FrameRate>,
-    /// Whose frame is counted next, where several wait for it.
+    /// Held by the request whose frame is counted next, so that others wait in order of arrival.
     next_frame: tokio::sync::Mutex<()>,
 }
 
@@ -99,8 +100,9 @@ impl Account {
         }
     }
 
-    /// That of a page with a token of this key: a part of the key's. It cannot take from the key's other sessions what
-    /// a body holds as slowly as it likes: memory, and places for requests. All else it shares with them.
+    /// The account of a page with a token of this key, which is a part of the key's account. A page may send a body as
+    /// slowly as it likes, and holds memory and a place for a request meanwhile. So it may use only a part of the key's
+    /// memory and places; it shares all else with the key.
     pub(super) fn of_page(client: Client, key: Arc<Self>) -> Self {
         let requests = key.quotas.requests.div_ceil(2);
         let quotas = Quotas {
@@ -121,8 +123,8 @@ impl Account {
         }
     }
 
-    /// Whether it may be forgotten: nothing is held, and a key has all of its frames again. Addresses are too many to
-    /// remember what they sent.
+    /// Whether the account may be forgotten: nothing is held and, for a key, its whole burst of frames is left again.
+    /// Addresses are too many to remember the frames that they sent.
     pub(super) fn is_idle(&self) -> bool {
         if self.key.is_some() {
             return self.held.upload_bytes.held() == 0;
@@ -136,7 +138,7 @@ impl Account {
         self.key.as_deref().unwrap_or(self)
     }
 
-    /// In whose turn the client's work is done.
+    /// The flow in whose turns the client's work is done.
     pub fn flow(&self) -> Flow {
         self.flow
     }
@@ -146,8 +148,8 @@ impl Account {
         (self.quotas.sessions, self.held.sessions.left())
     }
 
-    /// How many requests in flight the client may have, and how many of them are left. A page takes no more than it
-    /// leaves of its key's.
+    /// How many requests in flight the client may have, and how many of them are left. A page takes no more of its
+    /// key's places than it leaves free.
     pub fn requests(&self) -> (usize, usize) {
         let most = self.quotas.requests;
         let left = self.requests.available_permits();
@@ -190,7 +192,7 @@ impl Account {
         })
     }
 
-    /// The same, but waits for a place, in order of arrival.
+    /// Takes a place for a request in flight, and waits for it in order of arrival.
     pub async fn request_in_order(self: &Arc<Self>) -> RequestPermit {
         let permit = place_in_order(&self.requests).await;
         let of_key = match &self.key {
@@ -225,7 +227,7 @@ impl Account {
     /// Takes a place for a stream.
     ///
     /// # Errors
-    /// The client has as many as it may, or as are left to others.
+    /// The client has as many streams as it may, or as are left free.
     pub fn stream(&self) -> Result<Charge, QuotaExhausted> {
         let mut place = Charge::new(&self.all.streams, &self.held.streams);
         let taken = place.grow(1);
@@ -254,17 +256,17 @@ impl Account {
         })
     }
 
-    /// The place for a video that is decoded.
+    /// The client's places for decoding videos.
     pub fn videos(&self) -> VideoPlaces {
         self.videos.clone()
     }
 
-    /// How many frames of WebSockets the client may send.
+    /// The rate at which the client may send frames of WebSockets, for all of its connections.
     pub fn messages(&self) -> Arc<MessageRate> {
         self.messages.clone()
     }
 
-    /// The bytes that the client may have inside.
+    /// The budget of bytes of the client's uploads and answers.
     pub fn bytes(&self) -> &Budget {
         &self.held.upload_bytes
     }
@@ -272,7 +274,7 @@ impl Account {
     /// Waits until one frame more may be counted, in order of arrival.
     ///
     /// # Errors
-    /// None may until `deadline`.
+    /// No further frame may be counted until `deadline`.
     pub async fn count_frame_in_order(&self, deadline: Instant) -> Result<(), RateExceeded> {
         let turn = timeout_at(deadline, self.counting_frames().next_frame.lock()).await;
         loop {
@@ -290,7 +292,7 @@ impl Account {
     /// Counts frames of the client.
     ///
     /// # Errors
-    /// It has sent too many lately.
+    /// The client has sent too many frames lately.
     pub fn count_frames(&self, frames: usize) -> Result<(), RateExceeded> {
         let frames = u32::try_from(frames).ok().and_then(NonZeroU32::new);
         match (&self.counting_frames().frames, frames) {
@@ -301,12 +303,12 @@ impl Account {
 }
 
 impl RequestPermit {
-    /// In whose turn the request's work is done.
+    /// The flow in whose turns the request's work is done.
     pub fn flow(&self) -> Flow {
         self.account.flow
     }
 
-    /// The bytes that the client may have inside.
+    /// The budget of bytes of the client's uploads and answers.
     pub fn bytes(&self) -> &Budget {
         self.account.bytes()
     }

@@ -30,7 +30,7 @@ impl Client {
         Self::Address(customer_address(address))
     }
 
-    /// The networks that the client is in, which its provider may have given to one customer too.
+    /// The wider networks that the client's address is in: a provider may have given one of them to a single customer.
     pub fn networks(&self) -> impl Iterator<Item = Ipv6Net> {
         let address = match self {
             Self::Address(address) => Some(*address),
@@ -64,7 +64,7 @@ pub struct Holdings {
     pub sessions: Budget,
     /// Bytes of the states of sessions.
     pub session_bytes: Budget,
-    /// Bytes of bodies that have come, and of answers that are not taken.
+    /// Bytes of bodies that have arrived, and of answers that clients have not received yet.
     pub upload_bytes: Budget,
     /// Streams, each of which has a connection.
     pub streams: Budget,
@@ -94,7 +94,7 @@ impl Holdings {
         budgets.iter().all(|budget| budget.held() == 0)
     }
 
-    /// Those of a network, which has no maximum but what is free.
+    /// What the clients of a network hold; the network has no maximum of its own besides what is free.
     pub(super) fn of_network() -> Self {
         let budget = || Budget::new(usize::MAX);
         Self {
@@ -106,7 +106,7 @@ impl Holdings {
     }
 }
 
-/// Accounts above which those with nothing in use are forgotten.
+/// Where there are more accounts than this, those with nothing in use are forgotten.
 const MAX_IDLE_ACCOUNTS: usize = 1024;
 
 /// The accounts of all clients.
@@ -120,13 +120,12 @@ pub struct Clients {
 }
 
 impl Clients {
-    /// No client yet, with the quotas of this configuration. Where there is a store, memory is only a cache of
-    /// sessions.
+    /// No clients yet, with the quotas of this configuration. `has_store`: memory is only a cache of sessions.
     pub fn new(config: &Config, has_store: bool) -> Self {
         let limits = &config.limits;
         let quarter = |share: Option<usize>, whole: usize| share.unwrap_or(whole.div_ceil(4));
         let frames = NonZeroU32::new(limits.client_frame_rate).map(|rate| {
-            // A request with as many frames as a request may have must fit.
+            // The burst must fit a request with the most frames.
             let burst = u32::try_from(config.max_frames).unwrap_or(u32::MAX);
             (rate, rate.max(NonZeroU32::new(burst).unwrap_or(rate)))
         });
@@ -134,7 +133,7 @@ impl Clients {
         Self {
             quotas: Quotas {
                 sessions: quarter(limits.client_sessions, config.max_sessions),
-                // One session must fit.
+                // The share must fit one session.
                 session_bytes: quarter(None, config.session_bytes()).max(MAX_LIST_BYTES),
                 requests: quarter(limits.client_requests, config.queue),
                 streams: quarter(limits.client_connections, config.max_connections),
@@ -187,7 +186,7 @@ impl Clients {
 
     /// What the clients of a network hold.
     fn network(&self, network: Ipv6Net) -> Arc<Holdings> {
-        // Nothing panics while it is held.
+        // Nothing panics while the lock is held.
         let mut networks = self.networks.lock().unwrap_or_else(PoisonError::into_inner);
         if networks.len() >= MAX_IDLE_ACCOUNTS {
             networks.retain(|_, held| Arc::strong_count(held) > 1);
@@ -199,7 +198,7 @@ impl Clients {
     }
 
     fn lock(&self) -> MutexGuard<'_, HashMap<Client, Arc<Account>>> {
-        // Nothing panics while it is held.
+        // Nothing panics while the lock is held.
         self.accounts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,4 +1,5 @@
-//! How fast a client may go: fixed rates for what costs the network threads time, and the configured one of frames.
+//! How fast a client may send: fixed rates for what takes time of the network threads, and the configured rate of
+//! frames.
 
 use bagtrack_sessions::clock::{self, Instant};
 use governor::clock::{Clock, DefaultClock};
@@ -9,27 +10,27 @@ use std::num::NonZeroU32;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-/// A rate: how many a second, and how many at once.
+/// A rate: how many a second, and the burst, which is how many at once.
 pub type Rate = (NonZeroU32, NonZeroU32);
 
 /// Frames of WebSockets, which carry messages: as many as some hundred cameras send, and so few that they take a
 /// network thread little time, whatever is in them.
 pub const MESSAGES: Rate = rate(10_000, 2_000);
 /// Requests that take no turn at the workers: more than pages of some people and their programs ask for, and so few
-/// that they take a network thread some percent of its time. At once the 70 files of the page, for a dozen people
+/// that they take a network thread some percent of its time. The burst is the 70 files of the page for a dozen people
 /// behind one address.
 pub const ASKED: Rate = rate(500, 1_000);
-/// TLS handshakes: the service signs in each, for which a network thread takes milliseconds with a large key of RSA. At
-/// once the cameras and pages of some dozen people behind one address.
+/// TLS handshakes: in each the service signs, which takes a network thread milliseconds with a large RSA key. The burst
+/// is the cameras and pages of some dozen people behind one address.
 pub const HANDSHAKES: Rate = rate(25, 64);
 
 /// A client has sent too many of something lately.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the client may send {limit} {what}")]
 pub struct RateExceeded {
-    /// What it has sent too many of.
+    /// What the client has sent too many of.
     pub what: &'static str,
-    /// How many it may send.
+    /// How many it may send, in the unit of `what`.
     pub limit: usize,
     /// After how long it may send again.
     pub wait: Duration,
@@ -40,12 +41,12 @@ pub struct RateExceeded {
 pub struct FrameRate {
     rate: Rate,
     limiter: RateLimiter<NotKeyed, InMemoryState, DefaultClock, StateInformationMiddleware>,
-    /// How many frames were left at some moment.
+    /// How many frames were left when some were counted last, and when that was.
     left: Mutex<(u32, Instant)>,
 }
 
 impl FrameRate {
-    /// None was sent so far.
+    /// A rate of which no frame is counted yet.
     pub fn new(rate: Rate) -> Self {
         Self {
             rate,
@@ -68,18 +69,18 @@ impl FrameRate {
                 self.note_left(0);
                 Err(exceeded("frames a second", self.rate, &not_yet))
             }
-            // A request has no more frames than fit at once.
+            // More frames than the burst, which no request has.
             Err(_) => Ok(()),
         }
     }
 
-    /// Frames that are left now: those that were, and those that have come back since.
+    /// Frames that may be sent now: those left at the last count, and those regained since.
     pub fn left(&self) -> u32 {
         let (rate, burst) = self.rate;
         let noted = self.left.lock().unwrap_or_else(PoisonError::into_inner);
         let (left, at) = *noted;
         let back = at.elapsed().as_secs_f64() * f64::from(rate.get());
-        // The cast stops at the greatest value.
+        // The cast saturates.
         left.saturating_add(back as u32).min(burst.get())
     }
 
@@ -90,7 +91,7 @@ impl FrameRate {
     }
 }
 
-/// Counts one of what a limiter bounds at this rate.
+/// Counts one at a limiter of this rate; `what` names it in the error.
 ///
 /// # Errors
 /// Too many were counted lately.

@@ -7,12 +7,12 @@ use bagtrack_sessions::{
 };
 use std::sync::Arc;
 
-/// The sessions of a client: as many places as sessions with one target would take.
+/// The quota of a client's sessions. A session takes a place for each of its targets.
 #[derive(Debug)]
 pub struct ClientSessions(pub Arc<Account>);
 
 impl ClientSessions {
-    /// Why no session can be opened: the client has its maximum, or too little is left of what all may have.
+    /// Why no session can be opened: the client has its maximum, or too little is left of what all clients may have.
     fn refusal(&self, full: BudgetFull, what: &'static str, limit: usize) -> OpenError {
         match full {
             BudgetFull::Client => QuotaExhausted { what, limit }.into(),

@@ -10,20 +10,20 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 pub struct VideoPlaces {
     free: Arc<Semaphore>,
     all: usize,
-    /// Who waits for one, and whether it is promised one that is given up.
+    /// For each waiting request, whether a place that is being given up is promised to it.
     waiting: watch::Sender<Vec<IsPromised>>,
 }
 
 type IsPromised = Arc<AtomicBool>;
 
-/// One that waits.
+/// A request that waits, as long as this lives.
 struct Waiting<'a> {
     all: &'a watch::Sender<Vec<IsPromised>>,
     own: IsPromised,
 }
 
 impl VideoPlaces {
-    /// So many places.
+    /// `all` places.
     pub fn new(all: usize) -> Self {
         Self {
             free: Arc::new(Semaphore::new(all)),
@@ -32,25 +32,25 @@ impl VideoPlaces {
         }
     }
 
-    /// How many are taken.
+    /// How many places are taken.
     pub fn taken(&self) -> usize {
         self.all.saturating_sub(self.free.available_permits())
     }
 
-    /// Waits for a place until `deadline`; none where there is none until then.
+    /// Waits for a place until `deadline`; `None` where none is free by then.
     pub async fn take_until(&self, deadline: Instant) -> Option<OwnedSemaphorePermit> {
         let _waiting = Waiting::among(&self.waiting);
         let place = timeout_at(deadline, self.free.clone().acquire_owned()).await;
         place.ok()?.ok()
     }
 
-    /// Ready when it is `from` or later, and somebody waits for a place whom no other one is promised. The place has to
-    /// be given up then.
+    /// Waits until `from`, and then until a request waits for a place to which none is promised yet. The caller's place
+    /// is promised to that request, so the caller has to give it up.
     pub async fn wanted_from(&self, from: Instant) {
         sleep_until(from).await;
         let mut waiting = self.waiting.subscribe();
         let promise = |own: &IsPromised| !own.swap(true, Ordering::Relaxed);
-        // Its sender is `self`.
+        // The sender is in `self`, so the channel is open.
         let _ = waiting.wait_for(|all| all.iter().any(promise)).await;
     }
 }
