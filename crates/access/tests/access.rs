@@ -194,14 +194,14 @@ fn keys_of_settings_and_file_are_read_and_read_again() {
     assert_eq!(owner(OTHER), Some(Owner::named("you")));
     assert_eq!((count("me"), count("you"), count("they")), (1, 1, 0));
 
-    // With the mark that some editors begin a text with.
+    // With the byte-order mark that some editors begin a text with.
     let again = format!("\u{feff}they:{OTHER}\nme:0000000000000000\n");
     fs::write(&file, again).unwrap();
     assert_eq!(keys.reload().unwrap(), 3);
     assert_eq!(owner(OTHER), Some(Owner::named("they")));
     assert_eq!((count("me"), count("you"), count("they")), (2, 0, 1));
 
-    // What is refused changes nothing. A key is one client's.
+    // A file that is refused changes nothing. No two clients may have one key.
     let of_two = [format!("they:{OTHER}\nwe:{OTHER}"), format!("we:{KEY}")];
     for (text, expected) in [
         (&of_two[0][..], "they and we"),

@@ -20,7 +20,7 @@ use std::time::{Duration, SystemTime};
 const ISSUER: &str = "https://login.example.org/";
 const AUDIENCE: &str = "https://tracker.example.org";
 const SHORT: Duration = Duration::from_millis(10);
-/// Longer than anything takes that does happen.
+/// Longer than anything takes that the tests wait for.
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Seconds since 1970.
 const NOW: u64 = 1_800_000_000;
@@ -37,7 +37,7 @@ fn config() -> JwtConfig {
     }
 }
 
-/// The claims of a good token, with these changed; null takes one away.
+/// The claims of a good token, with the `changed` ones; null takes a claim away.
 fn claims(changed: Value) -> Value {
     let mut claims = json!({
         "iss": ISSUER, "aud": ["others", AUDIENCE], "sub": "auth0|5f7c8e", "exp": NOW + 300, "nbf": NOW - 5,
@@ -50,7 +50,7 @@ fn claims(changed: Value) -> Value {
     claims
 }
 
-/// Keys that a test changes. None: out of reach.
+/// Keys that a test changes; `None` where the issuer is out of reach.
 #[derive(Debug, Default)]
 struct Source {
     keys: Mutex<Option<String>>,
@@ -96,14 +96,14 @@ async fn a_token_speaks_for_its_subject_whatever_key_of_the_issuer_signed_it() {
     let (verifier, source) = verifier(&keys.each_ref());
     for key in &keys {
         let token = key.sign(&claims(json!({})));
-        // The second time it is known.
+        // The second time the token is remembered.
         for _ in 0..2 {
             let name = name_in(&verifier, &token).await;
             assert_eq!(name.as_deref(), Ok("jwt:auth0|5f7c8e"), "{key:?}");
         }
     }
     assert_eq!(source.read.load(Ordering::Relaxed), 1);
-    // Another claim may say whose the token is, and an audience stand alone.
+    // Another claim may name the owner, and the audience may be a text instead of a list.
     let config = JwtConfig {
         jwt_owner: "client_id".to_owned(),
         ..config()
@@ -122,7 +122,7 @@ async fn a_key_of_rsa_signs_with_its_six_algorithms() {
         let token = key.sign(&claims(json!({})));
         let taken = name_in(&verifier, &token).await;
         assert_eq!(taken.as_deref(), Ok("jwt:auth0|5f7c8e"), "{name}");
-        // Signed by the same key, and for other claims.
+        // The signature is of the same key, but of other claims.
         let (_, signature) = token.rsplit_once('.').unwrap();
         let header = json!({ "alg": name, "kid": "r" });
         let forged = unsigned(&header, &claims(json!({ "sub": "another" })));
@@ -241,7 +241,7 @@ async fn a_token_that_is_not_for_this_service_is_told_why() {
     }
 }
 
-/// RFC 8725, 2.1 and 3.1: the service must not take its own word for how a token is signed.
+/// RFC 8725, 2.1 and 3.1: the service must not trust the token's header for how the token is signed.
 #[tokio::test]
 async fn the_header_of_a_token_does_not_choose_how_it_is_checked() {
     let key = IssuerKey::p384("r");
@@ -249,7 +249,7 @@ async fn the_header_of_a_token_does_not_choose_how_it_is_checked() {
     let none = unsigned(&json!({ "alg": "none" }), &claims(json!({})));
     let refused = name_in(&verifier, &format!("{none}.")).await;
     assert_eq!(refused, Err(TokenError::Form));
-    // Everybody knows the public key: as a shared secret it signs nothing.
+    // Everybody knows the public key, so it must not be taken as a shared secret.
     for algorithm in ["HS256", "HS384", "HS512", "ES256"] {
         let header = json!({ "alg": algorithm, "kid": "r" });
         let forged = format!("{}.c2lnbmF0dXJl", unsigned(&header, &claims(json!({}))));
@@ -302,7 +302,7 @@ async fn the_issuer_may_change_its_keys_and_be_away() {
     let taken = async |token: &str, seconds| verifier.identify(token, at(NOW + seconds)).await;
 
     source.give(&[&old, &new]);
-    // Whoever invents names of keys has them read twice a minute, and no more.
+    // Tokens with invented names of keys make the service read the keys twice a minute at most.
     for seconds in 0..30 {
         assert_eq!(taken(&of_new, seconds).await, Err(TokenError::UnknownKey));
     }
@@ -322,10 +322,10 @@ async fn the_issuer_may_change_its_keys_and_be_away() {
     assert!(taken(&of_new, 90).await.is_ok());
     assert_eq!(reads(), 4);
 
-    // A key that was taken back is good for ten minutes at most, whatever was checked with it.
+    // A revoked key is good for ten minutes at most, also for tokens that were checked with it before.
     source.give(&[&new]);
     assert!(taken(&of_old, 689).await.is_ok());
-    // They are read beside the token that finds them old, and not twice.
+    // The token that finds the keys old does not wait for them, and they are read once.
     while taken(&of_old, 690).await.is_ok() {
         tokio::time::sleep(SHORT).await;
     }
@@ -344,10 +344,10 @@ async fn the_issuer_may_change_its_keys_and_be_away() {
     assert!(taken(&of_new, 1303).await.is_ok());
     source.give(&[&new, &old]);
     assert_eq!(verifier.reload(at(NOW + 1304)).unwrap(), 2);
-    // A key that was taken back while nobody came is good for nothing.
+    // A key that was revoked while no token came is refused at once.
     source.give(&[&new]);
     assert_eq!(taken(&of_old, 2504).await, Err(TokenError::UnknownKey));
-    // They end with their time all the same.
+    // Remembered tokens end with their time all the same.
     assert_eq!(taken(&of_new, 7260).await, Err(TokenError::Expired));
 }
 
@@ -383,7 +383,7 @@ async fn an_issuer_that_hangs_holds_nobody_up_whose_key_is_known() {
         let identified = verifier.identify(&of_known, at(NOW + seconds));
         let identified = tokio::time::timeout(PATIENCE, identified).await;
         assert!(identified.expect("nobody waits").is_ok(), "{seconds}");
-        // What reads beside it has begun.
+        // The reading in the background has begun by then.
         tokio::time::sleep(SHORT).await;
     }
     // Whoever has another key waits for the issuer.
@@ -507,7 +507,7 @@ async fn keys_come_from_a_file_from_an_address_and_from_where_the_issuer_says() 
         let name = name_in(&verifier, &token).await;
         assert_eq!(name.as_deref(), Ok("jwt:auth0|5f7c8e"), "{keys:?}");
     }
-    // A pipe nobody writes to would be read for ever.
+    // Reading a pipe to which nobody writes would never end.
     let pipe = folder.path().join("pipe");
     let made = std::process::Command::new("mkfifo").arg(&pipe).status();
     assert!(made.unwrap().success());

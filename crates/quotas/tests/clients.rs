@@ -8,8 +8,8 @@ use std::sync::Arc;
 use std::time::Duration;
 use uuid::Uuid;
 
-/// Clients of whom each may have 4 sessions and 6 requests in flight, and send a frame a second, 200 at once: so few
-/// come back that a slow machine counts as one that is not.
+/// Clients of whom each may have 4 sessions and 6 requests in flight, and send a frame a second, 200 at once. At this
+/// rate so few frames are regained that the test gives the same on a slow machine.
 fn clients() -> Clients {
     let mut config = Config {
         max_frames: 200,
@@ -119,7 +119,7 @@ async fn who_waits_for_a_request_gets_the_place_that_another_one_leaves() {
     assert!(clients.account(&key()).request().is_ok());
 }
 
-/// Whoever had it kept it as long as it liked, and nobody else of its key got one.
+/// The holder of the place has to give it up, or other requests with its key would never get it.
 #[tokio::test(start_paused = true)]
 async fn the_place_for_a_video_is_wanted_where_another_of_the_client_waits() {
     let clients = clients();
@@ -134,7 +134,7 @@ async fn the_place_for_a_video_is_wanted_where_another_of_the_client_waits() {
     assert!(next.await.expect("it does not panic"));
 }
 
-/// Requests of many addresses gave it all of its frames back.
+/// If the account were forgotten because of many other addresses, the key would get its whole burst again.
 #[test]
 fn a_key_that_has_sent_its_frames_is_remembered_beside_many_addresses() {
     let mut config = Config {

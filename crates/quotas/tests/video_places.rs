@@ -1,4 +1,4 @@
-//! The places for videos, of which one is given up for each that waits.
+//! The places for videos, of which one is given up for each waiting request.
 
 use bagtrack_quotas::VideoPlaces;
 use bagtrack_sessions::clock::{self, Instant, sleep};
@@ -19,13 +19,13 @@ async fn one_place_is_given_up_for_each_that_waits() {
         let place = places.take_until(after(1)).await.unwrap();
         holders.spawn(async move {
             places.wanted_from(after(60)).await;
-            // It takes a while until what was decoded has ended.
+            // The decoder takes a while to end.
             sleep(Duration::from_secs(1)).await;
             drop(place);
             clock::now()
         });
     }
-    // Nobody is wanted to go before its time, and nobody waits after it.
+    // No place is wanted before its time, and no request waits after the deadline.
     let began = clock::now();
     assert!(places.take_until(after(30)).await.is_none());
     sleep(Duration::from_secs(100)).await;
@@ -37,7 +37,7 @@ async fn one_place_is_given_up_for_each_that_waits() {
         gone.iter()
             .all(|gone| *gone > began + Duration::from_secs(130))
     );
-    // The third one stays, as none waits for it.
+    // The third holder keeps its place, since no request waits for it.
     assert!(
         timeout(Duration::from_secs(1000), holders.join_next())
             .await
