@@ -11,7 +11,7 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 use tokio::sync::Notify;
 
-/// Moments are counted from here.
+/// The origin of moments here.
 static START: LazyLock<Instant> = LazyLock::new(clock::now);
 
 const IDLE: u8 = 0;
@@ -22,18 +22,18 @@ const ANSWERING: u8 = 2;
 #[derive(Debug)]
 pub struct Activity {
     state: AtomicU8,
-    /// Nanoseconds from [`START`] to when it became idle.
+    /// Nanoseconds from [`START`] to when the connection became idle.
     idle_since: AtomicU64,
     /// Whether a stream has taken the connection over.
     streams: AtomicBool,
-    /// Told when the connection is to end.
+    /// Notified when the connection is to end.
     pub shed: Notify,
-    /// To tell that the connection has become idle.
+    /// Notified when the connection has become idle.
     idle: Arc<Notify>,
 }
 
 impl Activity {
-    /// A new connection is idle. `idle` is told each time that it becomes idle again.
+    /// A new connection is idle. `idle` is notified each time that it becomes idle.
     pub fn new(idle: Arc<Notify>) -> Arc<Self> {
         let activity = Self {
             state: AtomicU8::new(IDLE),
@@ -53,15 +53,15 @@ impl Activity {
         self.idle.notify_one();
     }
 
-    /// Since when no request has been in progress, from some fixed moment; none while one is. A head that has begun is
-    /// not yet a request.
+    /// Since when no request has been in progress, as the time from a fixed moment; `None` while one is, or where a
+    /// stream has the connection. A head that has begun is not yet a request.
     pub fn idle_since(&self) -> Option<Duration> {
         let since = Duration::from_nanos(self.idle_since.load(Ordering::Relaxed));
         let is_idle = self.state.load(Ordering::Acquire) == IDLE && !self.is_stream();
         is_idle.then_some(since)
     }
 
-    /// A stream takes the connection over: it is never idle again.
+    /// Notes that a stream takes the connection over: it is never idle again.
     pub fn stream(&self) {
         self.streams.store(true, Ordering::Release);
     }
@@ -76,17 +76,17 @@ impl Activity {
         self.state.load(Ordering::Acquire) == ANSWERING
     }
 
-    /// A request has come, up to its body, which notes its own end.
+    /// Notes that a request has come, up to its body. The returned body notes its own end.
     pub fn receive(self: &Arc<Self>, body: Body) -> Body {
         self.state.store(RECEIVING, Ordering::Release);
         self.watch(body, Activity::received)
     }
 
-    /// The answer is ready, up to its body, which notes its own end.
+    /// Notes that the answer is ready. The returned answer's body notes its own end.
     pub fn answer(self: &Arc<Self>, answer: Response) -> Response {
         self.state.store(ANSWERING, Ordering::Release);
         answer.map(|body| {
-            // One without a body is dropped as soon as its head is sent.
+            // hyper drops an empty body as soon as the head is sent.
             Body::new(WatchedBody {
                 body,
                 activity: self.clone(),
@@ -111,7 +111,8 @@ impl Activity {
         })
     }
 
-    /// The rest of a refused body may end after its answer.
+    /// Notes that the request's body has ended. The rest of a refused body may end after its answer; then the state
+    /// stays.
     fn received(&self) {
         let (from, to) = (RECEIVING, ANSWERING);
         let _ = self

@@ -55,7 +55,7 @@ pub enum CertificateError {
         /// What is wrong with it.
         reason: String,
     },
-    /// They are not a pair, or of a kind that is not supported.
+    /// The certificate and the key are not a pair, or of a kind that is not supported.
     #[error(
         "{cert} (--tls-cert) and {key} (--tls-key) cannot be used together: {reason}. The first certificate of the file \
          must be that of the key, of X.509 version 3, and ECDSA (P-256, P-384), RSA (2048 bits or more) or Ed25519"
@@ -70,7 +70,7 @@ pub enum CertificateError {
     },
 }
 
-/// The certificate and its key. Clones are the same one.
+/// The certificate and its key. Clones share them.
 #[derive(Debug, Clone)]
 pub struct Certificate(Arc<Inner>);
 
@@ -82,7 +82,8 @@ struct Inner {
 }
 
 impl Certificate {
-    /// That of these files, where they are named. The log warns of one that clients refuse for its time.
+    /// Reads the certificate of these files; `None` where neither is named. The log warns of a certificate that clients
+    /// refuse at `now`.
     ///
     /// # Errors
     /// See [`CertificateError`].
@@ -102,21 +103,21 @@ impl Certificate {
         }
     }
 
-    /// Reads the files again. Connections that are open keep what they have.
+    /// Reads the files again. Open connections keep the former certificate.
     ///
     /// # Errors
-    /// See [`CertificateError`]. The certificate is then as before.
+    /// See [`CertificateError`]. The certificate then stays as it was.
     pub fn reload(&self, now: SystemTime) -> Result<(), CertificateError> {
         check_regular(&self.0.cert, "tls-cert")?;
         check_regular(&self.0.key, "tls-key")?;
         let read = Arc::new(server_config(&self.0.cert, &self.0.key, now)?);
         let current = self.0.current.write();
-        // Nothing panics while it is held.
+        // Nothing panics while the lock is held.
         *current.unwrap_or_else(PoisonError::into_inner) = read;
         Ok(())
     }
 
-    /// What takes a connection with the certificate as it is now.
+    /// The acceptor of connections with the current certificate.
     pub fn acceptor(&self) -> TlsAcceptor {
         let current = self.0.current.read();
         TlsAcceptor::from(current.unwrap_or_else(PoisonError::into_inner).clone())
@@ -163,7 +164,7 @@ fn chain(path: &Path) -> Result<Vec<CertificateDer<'static>>, CertificateError> 
     }
 }
 
-/// Warns of a certificate that has ended, or has not begun. One that cannot be read is refused elsewhere.
+/// Warns of a certificate that has ended, or has not begun. A certificate that cannot be parsed is refused elsewhere.
 fn warn_of_time(path: &Path, certificate: &CertificateDer<'_>, now: SystemTime) {
     let Ok(read) = CertificateInner::<Rfc5280>::from_der(certificate) else {
         return;

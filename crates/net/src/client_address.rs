@@ -34,7 +34,7 @@ pub fn client_address(peer: IpAddr, headers: &HeaderMap, trusted: &[IpNet]) -> I
     }
 }
 
-/// Whether somebody says whom a request was passed on for.
+/// Whether a request has one of the two headers.
 pub fn is_forwarded(headers: &HeaderMap) -> bool {
     headers.contains_key(FORWARDED) || headers.contains_key(X_FORWARDED_FOR)
 }
@@ -44,10 +44,10 @@ pub fn is_trusted(address: IpAddr, trusted: &[IpNet]) -> bool {
     trusted.iter().any(|network| network.contains(&address))
 }
 
-/// The elements of a header that is a list, from all its lines; none without the header.
+/// The elements of a header that is a list, from all its lines; `None` without the header.
 fn list<'a>(headers: &'a HeaderMap, name: &str) -> Option<Vec<&'a str>> {
     let lines = headers.get_all(name).iter();
-    // A line that is not text is a hop that nobody can name.
+    // A line that is not text is one hop without a readable address.
     let hops = lines.flat_map(|line| line.to_str().unwrap_or("").split(','));
     let hops: Vec<&str> = hops.map(str::trim).collect();
     (!hops.is_empty()).then_some(hops)
@@ -89,9 +89,9 @@ fn parse(text: &str) -> Option<IpAddr> {
 #[derive(Debug, Clone, Copy)]
 pub struct Peer(pub SocketAddr);
 
-/// Bits of an IPv6 address that a provider gives to one customer at least (RFC 6177).
+/// Prefix length, in bits, of the smallest IPv6 network that a provider gives to one customer (RFC 6177).
 const IPV6_PREFIX: u8 = 64;
-/// Those that some customers get.
+/// Prefix lengths of the wider networks that some customers get.
 const WIDER_PREFIXES: [u8; 2] = [48, 56];
 
 /// What the addresses of one customer have in common: an IPv4 address, or the first address of an IPv6 network of 64
@@ -106,7 +106,7 @@ pub fn customer_address(address: IpAddr) -> IpAddr {
     }
 }
 
-/// The networks of IPv6 that the address is in, which its provider may have given to one customer too.
+/// The wider IPv6 networks that the address is in: a provider may have given one of them to a single customer.
 pub fn wider_networks(address: IpAddr) -> impl Iterator<Item = Ipv6Net> {
     let address = match address {
         IpAddr::V6(address) => Some(address),

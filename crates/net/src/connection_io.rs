@@ -1,9 +1,9 @@
-//! A connection's bytes, with what hyper's own handling of them lacks.
+//! A connection's bytes, with two rules for clients that hyper lacks.
 //!
-//! - *A client that takes an answer slowly*, or nothing of it, is let go.
+//! - *A client that takes an answer slowly*, or nothing of it, is disconnected.
 //! - *A client that has closed its side* may still wait for its answer, or have gone: TCP does not tell. It gets some
 //!   time for the answer to a whole request; then it counts as gone, and its request is dropped. Whether the request is
-//!   whole shows when its handler has read the body, for which there is a moment.
+//!   whole shows once its handler has read the body, for which the handler gets half a second.
 
 use super::activity::Activity;
 use super::handshake::Transport;
@@ -16,15 +16,15 @@ use std::task::{Context, Poll, ready};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 
-/// Time for a handler to read the body that has come.
+/// Time for a handler to read the body that has arrived.
 const READING: Duration = Duration::from_millis(500);
 
 /// How long the client of a connection is waited for.
 #[derive(Debug, Clone, Copy)]
 pub struct ClientLimits {
-    /// Time in which it takes no byte of an answer, or takes them too slowly.
+    /// How long the client may take no byte of an answer, or take them too slowly.
     pub write_timeout: Duration,
-    /// Bytes a second of an answer that it takes at least.
+    /// Bytes a second of an answer that the client has to take at least.
     pub min_answer_rate: u32,
     /// Time for the answer to a client that has closed its side.
     pub half_close_timeout: Duration,
@@ -35,7 +35,7 @@ pub struct ClientLimits {
 pub struct ConnectionIo {
     stream: Transport,
     activity: Arc<Activity>,
-    /// At which the client takes answers.
+    /// The least rate at which the client has to take answers.
     rate: LeastRate,
     half_close_timeout: Duration,
     /// Set when the client has closed its side: since when, and what wakes the connection.
@@ -43,7 +43,7 @@ pub struct ConnectionIo {
 }
 
 impl ConnectionIo {
-    /// For a stream whose service tells `activity` what it does.
+    /// A connection over `stream`, whose service notes in `activity` what it does.
     pub fn new(stream: Transport, activity: Arc<Activity>, limits: ClientLimits) -> Self {
         Self {
             stream,
@@ -54,7 +54,7 @@ impl ConnectionIo {
         }
     }
 
-    /// What came of writing: an error where the client is too slow.
+    /// Passes the result of a write on, or an error where the client is too slow.
     fn paced(
         &mut self,
         cx: &mut Context<'_>,
@@ -71,7 +71,7 @@ impl ConnectionIo {
         written
     }
 
-    /// What came of sending what TLS has encrypted: an error where the client is too slow.
+    /// Passes the result of a flush or shutdown on, or an error where the client is too slow.
     fn timely(&mut self, cx: &mut Context<'_>, sent: Poll<io::Result<()>>) -> Poll<io::Result<()>> {
         match sent {
             Poll::Ready(_) => self.rate.pause(),

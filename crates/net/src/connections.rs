@@ -1,12 +1,13 @@
 //! The open connections: how many there are, whose they are, and which one makes room for a new one.
 //!
-//! A client is an IPv4 address or an IPv6 network of 64 bits. It has at most its maximum, and at most as many as are
-//! free or idle (a dynamic threshold, as in [`Budget`](bagtrack_sessions::Budget)): so a few clients with busy
-//! connections leave some to each further one. The wider IPv6 networks that a client is in may hold as many as one
-//! client, and beyond that as many as are free or idle.
+//! A client is an IPv4 address or an IPv6 network of 64 bits. A client has at most its maximum of connections, and at
+//! most as many as are free or idle (a dynamic threshold, as in [`Budget`](bagtrack_sessions::Budget)): so a few
+//! clients with busy connections leave some to each further client. The wider IPv6 networks that a client is in may
+//! hold as many as one client, and beyond that as many as are free or idle.
 //!
-//! Whoever may have no more loses the one of its own that was idle longest. When all are taken, it is one of the client
-//! that has most. A connection with a request in progress is never closed for another one.
+//! A client that may have no more loses its own connection that was idle longest. When all connections are taken, the
+//! client with the most connections that has an idle one loses its longest idle one. A connection with a request in
+//! progress is never closed for another one.
 //!
 //! Each has a [hold](ConnectionHold) on its place until it ends, whoever serves it: HTTP first, then perhaps a stream
 //! that takes it over.
@@ -45,9 +46,9 @@ pub struct Connections {
     max: usize,
     max_of_address: usize,
     open: Mutex<Open>,
-    /// Told when one has ended or has become idle.
+    /// Notified when a connection has ended or has become idle.
     pub freed: Arc<Notify>,
-    /// Counts those that were closed for others.
+    /// Counts connections that were closed for others.
     shed: Counter,
 }
 
@@ -58,10 +59,10 @@ struct Open {
     counts: HashMap<Holder, usize>,
 }
 
-/// Whose connections are counted.
+/// For whom connections are counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Holder {
-    /// By what its addresses have in common.
+    /// A client, by its [`customer_address`].
     Client(IpAddr),
     Network(Ipv6Net),
 }
@@ -84,7 +85,8 @@ pub struct ConnectionPermit {
 }
 
 impl Connections {
-    /// At most `max` together and `max_of_address` of one address. `shed` counts those that are closed for others.
+    /// At most `max` connections together and `max_of_address` of one client. `shed` counts those that are closed for
+    /// others.
     pub fn new(max: usize, max_of_address: usize, shed: Counter) -> Arc<Self> {
         Arc::new(Self {
             max,
@@ -95,7 +97,7 @@ impl Connections {
         })
     }
 
-    /// Takes a place for a connection from `address`. One that is `shared` is a proxy's, which many clients use.
+    /// Takes a place for a connection from `address`. One that is `shared` comes from a proxy that many clients use.
     ///
     /// # Errors
     /// There is no place, and no idle connection to close for it.
@@ -136,12 +138,12 @@ impl Connections {
         }
     }
 
-    /// Whether a client may have one more where so many are free.
+    /// Whether a client may have one more connection where `free` are free.
     fn leaves_room(&self, open: &Open, client: IpAddr, free: usize) -> bool {
         let is_alone = open.count(&Holder::Client(client)) == open.connections.len();
         Holder::all_of(client).all(|holder| {
             let most = match holder {
-                // Whoever is alone may have what is left over.
+                // A client that alone has connections may have all that is free.
                 Holder::Client(_) if is_alone => self.max_of_address,
                 Holder::Client(_) => self.max_of_address.min(free),
                 Holder::Network(_) => self.max_of_address.max(free),
@@ -151,7 +153,7 @@ impl Connections {
     }
 
     fn open(&self) -> MutexGuard<'_, Open> {
-        // Nothing panics while it is held.
+        // Nothing panics while the lock is held.
         self.open.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -167,7 +169,8 @@ impl Open {
         idle.count()
     }
 
-    /// Closes an idle connection of those clients, if there is one.
+    /// Closes an idle connection of the clients that `of` accepts, if there is one: of the client with the most
+    /// connections, the one that was idle longest.
     fn shed(&mut self, of: impl Fn(IpAddr) -> bool) -> Option<()> {
         let idle = self
             .connections
@@ -212,7 +215,8 @@ pub struct ConnectionHold {
 }
 
 impl ConnectionHold {
-    /// For a connection that ends in order when `ending` turns true, and at once when `cut_off` loses its sender.
+    /// The hold of a connection that ends in order when `ending` turns true, and at once when `cut_off` loses its
+    /// sender.
     pub fn new(
         permit: ConnectionPermit,
         ending: watch::Receiver<bool>,
@@ -241,7 +245,7 @@ impl ConnectionHold {
         while self.cut_off.changed().await.is_ok() {}
     }
 
-    /// What comes of `beginning`, unless the connection has to end before that.
+    /// The output of `beginning`, unless the connection has to end before.
     pub async fn begin<T>(&mut self, beginning: impl Future<Output = T>) -> Option<T> {
         let activity = self.activity().clone();
         let mut cut_off = self.clone();
@@ -297,7 +301,7 @@ mod tests {
         let address = |last: u8| IpAddr::from([192, 0, 2, last]);
         let enter = |last: u8| connections.enter(address(last), false);
         let busy = enter(1).unwrap();
-        // It has begun to send a body.
+        // The client has begun to send a body.
         let never = futures_util::stream::pending::<Result<Vec<u8>, std::io::Error>>();
         let _body = busy.activity.receive(Body::from_stream(never));
         let idle = [enter(1).unwrap(), enter(1).unwrap(), enter(2).unwrap()];
@@ -311,7 +315,7 @@ mod tests {
         assert!(numbers().contains(&busy.number) && numbers().contains(&idle[2].number));
         let _fourth = enter(1).unwrap();
         let _fifth = enter(1).unwrap();
-        // Its own idle ones went for them.
+        // Two idle connections of the same client were closed for them.
         let first = Holder::Client(address(1));
         assert_eq!(connections.open().count(&first), 2);
         drop(idle);

@@ -1,11 +1,12 @@
 //! The bytes of a WebSocket connection, with the client's messages in small fragments, and their memory charged.
 //!
-//! The library makes room for a whole frame when its head has come (docs/upstream/tungstenite.md), and keeps that room
-//! for the next one: a few bytes, or one large message, would hold memory for the life of a stream. So it gets each
-//! frame in fragments (RFC 6455, section 5.4). Its own buffer holds one of them, and a message is put together as it
-//! arrives. A fragment is handed over when its memory is charged. Where there is none the client waits: nothing more is
-//! read from it. So does a client whose streams send more frames a second than it may: the smallest ones cost next to
-//! no bytes. Each fragment counts as work of its task, which gives others their turn after some of them.
+//! tungstenite allocates room for a whole frame when the frame's head has come (docs/upstream/tungstenite.md), and
+//! keeps the room for the next frame. So a few bytes, or one large message, would hold memory for the life of a stream.
+//! This wrapper therefore gives the library each frame in fragments (RFC 6455, section 5.4): the library's buffer holds
+//! one fragment, and the message grows as it arrives. A fragment is handed over once its memory is charged. While there
+//! is none, nothing more is read from the client. The same holds for a client whose streams send more frames a second
+//! than it may, since the smallest frames cost next to no bytes. Each fragment counts as work of its task, so that
+//! other tasks get their turn.
 
 use crate::LeastRate;
 use arrayvec::ArrayVec;
@@ -23,28 +24,29 @@ use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::task::coop::poll_proceed;
 
-/// How many frames of WebSockets a client may send.
+/// The limiter of the frames of WebSockets that a client may send.
 pub type MessageRate = DefaultDirectRateLimiter;
 
-/// Most bytes of a fragment. Masks have four bytes, so each fragment begins with the first of them.
+/// Most bytes of a fragment: a multiple of the mask's four bytes, so each fragment begins with the mask's first byte.
 const FRAGMENT: usize = 16 << 10;
 const READ_BYTES: usize = 32 << 10;
-/// A message that grows may be there twice: in the room that it had, and in the one that it gets.
+/// While the buffer of a message grows, the message may be in memory twice.
 const COPIES: usize = 2;
 /// How long to wait before memory is asked for again.
 const RETRY: Duration = Duration::from_millis(20);
 
-/// What a frame takes of the time of its message: empty ones would never end it where the service is the slower one.
+/// Time of its message that each frame uses up. Otherwise a message of empty frames would never end where the service
+/// is slower than the client.
 const FRAME_TIME: Duration = Duration::from_micros(100);
-/// A timer that is asked for less would cost more than the frames that it lets pass.
+/// Least time to wait for the frame rate: a shorter timer would cost more than the frames that it lets pass.
 const LEAST_WAIT: Duration = Duration::from_millis(5);
 
-/// The first byte of a frame: the last of its message.
+/// Bit of a frame's first byte: this frame is the last of its message.
 const FINAL: u8 = 0x80;
 const OPCODE: u8 = 0x0F;
-/// Frames of this code and above control the connection.
+/// Frames of this opcode and above control the connection.
 const CONTROL: u8 = 8;
-/// The second byte of a frame.
+/// Bits of a frame's second byte.
 const MASKED: u8 = 0x80;
 const LENGTH: u8 = 0x7F;
 
@@ -53,7 +55,7 @@ const LENGTH: u8 = 0x7F;
 #[error("the message is too slow")]
 pub struct MessageTooSlow;
 
-/// A frame of the client, as far as it was not handed over.
+/// The rest of a client's frame that was not handed over yet.
 #[derive(Debug)]
 struct Frame {
     /// Its first byte.
@@ -62,14 +64,14 @@ struct Frame {
     left: u64,
 }
 
-/// How slowly messages may come, and how fast.
+/// The least and greatest rates at which messages may come.
 #[derive(Debug)]
 pub struct Rates {
     /// Least bytes a second.
     pub bytes: LeastRate,
-    /// The time of a message, of which its bytes give some back.
+    /// The time of a whole message, of which its bytes pay some back.
     pub message: LeastRate,
-    /// Most frames a second, of all streams of the client.
+    /// Most frames a second, for all streams of the client.
     pub messages: Arc<MessageRate>,
 }
 
@@ -77,10 +79,10 @@ pub struct Rates {
 #[derive(Debug)]
 pub struct Fragments<S> {
     stream: S,
-    /// What was read and not handed over.
+    /// Bytes that were read and not handed over.
     input: BytesMut,
     frame: Option<Frame>,
-    /// The head of the next fragment, and the bytes of it that follow.
+    /// The head of the next fragment, as far as it was not handed over, and how many bytes of its payload follow.
     head: ArrayVec<u8, 8>,
     fragment_left: usize,
     budgets: [Budget; 2],
@@ -92,14 +94,14 @@ pub struct Fragments<S> {
     rate: LeastRate,
     /// The whole time of a message.
     deadline: LeastRate,
-    /// Whether a message has begun.
+    /// Whether a message has begun and not ended.
     is_within: bool,
     is_heard: bool,
 }
 
 impl<S> Fragments<S> {
-    /// For a connection from which `read` was read already. Messages are charged to the budgets of all clients and of
-    /// this one, and come at these rates.
+    /// Wraps a connection from which `read` was read already. `budgets` are those of all clients and of this one, to
+    /// which messages are charged.
     pub fn new(stream: S, read: &[u8], budgets: [Budget; 2], rates: Rates) -> Self {
         let charge = Charge::new(&budgets[0], &budgets[1]);
         Self {
@@ -125,12 +127,12 @@ impl<S> Fragments<S> {
         std::mem::replace(&mut self.charge, next)
     }
 
-    /// Whether anything has come since this was asked last.
+    /// Whether the client has sent anything since the last call.
     pub fn take_heard(&mut self) -> bool {
         std::mem::take(&mut self.is_heard)
     }
 
-    /// Nothing is read for a while, which is not the client's fault.
+    /// Stops the clocks of the rates: the service does not read for a while.
     pub fn pause(&mut self) {
         self.deadline.pause();
         self.rate.pause();
@@ -141,8 +143,8 @@ impl<S> Fragments<S> {
         self.is_within || self.fragment_left > 0 || !self.input.is_empty()
     }
 
-    /// Waits for the client's turn to send one more frame, where its next one has come. A message that has begun has no
-    /// more time for it: else one of empty frames would never end.
+    /// Where the head of the next frame has come, waits until the rate lets the client send one more. The wait uses up
+    /// the time of a message that has begun: otherwise a message of empty frames would never end.
     ///
     /// # Errors
     /// The message is too slow.
@@ -166,10 +168,10 @@ impl<S> Fragments<S> {
         Poll::Pending
     }
 
-    /// Makes the next fragment from what was read, where that has begun.
+    /// Makes the next fragment from the bytes that were read. False where there is no frame's head yet.
     ///
     /// # Errors
-    /// There is no memory for it.
+    /// A budget has no room for the fragment.
     fn begin_fragment(&mut self) -> Result<bool, BudgetFull> {
         if self.frame.is_none() {
             self.frame = take_head(&mut self.input);
@@ -206,11 +208,11 @@ impl<S> Fragments<S> {
             if !self.is_within {
                 self.deadline.reset();
             }
-            // Heads pay for no time.
+            // Only payload pays time back, and heads do not.
             self.deadline.moved(length);
             self.is_within = !is_last || frame.first & FINAL == 0;
         }
-        // What follows goes on with the message.
+        // Further fragments of this frame are continuations (opcode 0).
         frame.first &= !OPCODE;
         if is_last {
             self.frame = None;
@@ -242,7 +244,7 @@ fn take_head(input: &mut BytesMut) -> Option<Frame> {
 }
 
 impl<S: AsyncRead + Unpin> Fragments<S> {
-    /// Reads more. Gives whether anything came before the end.
+    /// Reads more bytes. False at the end of the stream.
     fn poll_input(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<bool>> {
         let mut bytes = [0; READ_BYTES];
         let mut buffer = ReadBuf::new(&mut bytes);
@@ -266,7 +268,7 @@ impl<S: AsyncRead + Unpin> Fragments<S> {
         }
     }
 
-    /// Reads until the client has closed its side, and throws that away.
+    /// Reads until the client has closed its side, and drops the bytes.
     pub async fn discard(&mut self) {
         poll_fn(|cx| {
             loop {
@@ -281,7 +283,7 @@ impl<S: AsyncRead + Unpin> Fragments<S> {
         .await;
     }
 
-    /// Waits before memory is asked for again. It has the time of the message.
+    /// Waits before memory is asked for again. An error where the client's time at the least rate is over.
     fn poll_memory(&mut self, cx: &mut Context<'_>, full: BudgetFull) -> Poll<io::Error> {
         if self.rate.poll_late(cx).is_ready() {
             return Poll::Ready(io::Error::other(full));

@@ -1,7 +1,7 @@
-//! From an accepted connection to one over which HTTP is spoken: with TLS, its handshake.
+//! From an accepted connection to one that is ready for HTTP: with TLS, after the handshake.
 //!
-//! A client that speaks plain HTTP to a service with TLS shows it by its first byte. It can be served, too: by
-//! routes that tell it the right address.
+//! The first byte of a client shows whether it speaks plain HTTP to a service with TLS. Other routes then tell the
+//! client the right address.
 
 use std::fmt::Debug;
 use std::io;
@@ -19,18 +19,18 @@ const HANDSHAKE_RECORD: u8 = 22;
 #[cfg(feature = "tls")]
 pub const MAX_UNSENT_BYTES: usize = 32 << 10;
 
-/// What the bytes of a connection come over, decrypted: a socket, TLS over one, or the line of a simulation.
+/// The stream of a connection's decrypted bytes: a socket, TLS over a socket, or the line of a simulation.
 pub trait ByteStream: AsyncRead + AsyncWrite + Debug + Send + Unpin {}
 
 impl<T: AsyncRead + AsyncWrite + Debug + Send + Unpin> ByteStream for T {}
 
-/// Any of these.
+/// Any stream of bytes.
 pub type Transport = Box<dyn ByteStream>;
 
 /// How the connections of a service begin.
 #[derive(Debug, Clone)]
 pub enum Security {
-    /// With the request.
+    /// With the first request.
     Plain,
     /// With a TLS handshake, in which the client gets this certificate.
     #[cfg(feature = "tls")]
@@ -40,9 +40,9 @@ pub enum Security {
 /// What a connection turned out to be.
 #[derive(Debug)]
 pub enum Begun {
-    /// One that the service's requests come over.
+    /// A connection for the service's requests.
     AsConfigured(Transport),
-    /// One of a client that does not know that the service has TLS.
+    /// A connection of a client that speaks plain HTTP although the service has TLS.
     #[cfg(feature = "tls")]
     WithoutTls(Transport),
 }

@@ -1,8 +1,8 @@
 //! The least rate at which a client has to send or to take bytes.
 //!
-//! Only the time counts in which the service waits for the client. The client may use up a fixed time of it; bytes that
-//! go over pay some of it back, and where that is allowed some in advance. So a client that now and then moves a byte
-//! does not hold its connection for long.
+//! Only time in which the service waits for the client counts. The client has a fixed time to use up. Each byte that is
+//! transferred pays some of it back and, where that is allowed, some in advance. So a client that now and then moves a
+//! byte does not hold its connection for long.
 
 use bagtrack_sessions::clock::{self, Instant, Sleep, sleep_until};
 use std::pin::Pin;
@@ -16,15 +16,15 @@ pub struct LeastRate {
     min_rate: u32,
     /// Time that the client may still be waited for.
     left: Duration,
-    /// Most of it that bytes can pay for.
+    /// The most that `left` can become by bytes.
     most: Duration,
-    /// Since when the service waits.
+    /// Since when the service waits for the client; `None` while it does not wait.
     since: Option<Instant>,
     late: Pin<Box<Sleep>>,
 }
 
 impl LeastRate {
-    /// `min_rate` bytes a second, with `grace` to use up.
+    /// A least rate of `min_rate` bytes a second, with the time `grace` to use up.
     pub fn new(grace: Duration, min_rate: u32) -> Self {
         Self {
             min_rate: min_rate.max(1),
@@ -35,7 +35,7 @@ impl LeastRate {
         }
     }
 
-    /// Bytes that come sooner than they have to pay for a longer wait, up to `most`.
+    /// Lets bytes that come early pay for a longer wait, up to `most`.
     pub fn with_credit(self, most: Duration) -> Self {
         Self {
             most: most.max(self.most),
@@ -43,12 +43,12 @@ impl LeastRate {
         }
     }
 
-    /// None of the time is used up.
+    /// Gives the client its whole time again.
     pub fn reset(&mut self) {
         (self.left, self.since) = (self.most, None);
     }
 
-    /// So many bytes went over.
+    /// Notes that `bytes` bytes were transferred.
     pub fn moved(&mut self, bytes: usize) {
         self.pause();
         let paid = bytes as f64 / f64::from(self.min_rate);
@@ -56,14 +56,14 @@ impl LeastRate {
         self.left = left.min(self.most);
     }
 
-    /// The service does not wait for the client any more.
+    /// Notes that the service does not wait for the client any more.
     pub fn pause(&mut self) {
         if let Some(since) = self.since.take() {
             self.left = self.left.saturating_sub(since.elapsed());
         }
     }
 
-    /// The client has used up so much of its time by what it sent. Tells whether any is left.
+    /// Charges `time` to the client for what it sent. Returns whether any time is left.
     pub fn spend(&mut self, time: Duration) -> bool {
         self.pause();
         self.left = self.left.saturating_sub(time);

@@ -1,5 +1,5 @@
-//! A fault of tungstenite by itself, which [`Fragments`](bagtrack_net::Fragments) guard against. When this fails it was
-//! mended: then docs/upstream/tungstenite.md says what can go.
+//! A fault of tungstenite by itself, which [`Fragments`](bagtrack_net::Fragments) guard against. If this test fails,
+//! the fault is mended: docs/upstream/tungstenite.md then says which code can go.
 
 use std::io::Cursor;
 use tungstenite::protocol::{Role, WebSocket};
