@@ -1,4 +1,4 @@
-//! Nothing but work, so many times, for `tools/count_instructions.sh`:
+//! Pieces of work, done a given number of times, for `tools/count_instructions.sh`:
 //!
 //! - `fill PRESET FILE`: writes a tracker whose bag is full. Under callgrind that would take minutes.
 //! - `step FILE COUNT`: up to 16 steps of this tracker, on gray frames of 320 x 240.
@@ -46,7 +46,7 @@ fn fill(preset: Preset, file: &str) {
 fn step(file: &str, count: usize) {
     let saved = std::fs::read(file).expect("a file that `fill` wrote");
     let mut tracker = Tracker::restore(&saved).expect("a tracker that `fill` wrote");
-    // As many for each count, so that drawing them falls out of the difference.
+    // The same number of frames for each count, so that drawing them cancels out in the difference.
     let frames: Vec<_> = (1..=MOST_STEPS).map(scene::frame).collect();
     for frame in &frames[..count] {
         tracker.step(frame).expect("frames of one size");

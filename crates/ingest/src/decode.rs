@@ -1,5 +1,5 @@
-//! The steps from bytes to a frame: sniff, read the structure, limit; then decode strictly, luma and chroma, EXIF
-//! orientation, downscale.
+//! The steps from bytes to a frame: sniff the type, read the structure, check the limits; then decode strictly, take
+//! luma and chroma, turn upright by the EXIF orientation, and downscale.
 
 use super::error::IngestError;
 use super::jpeg::Jpeg;
@@ -58,7 +58,7 @@ fn unread(bytes: &[u8]) -> IngestError {
 }
 
 impl Inspected<'_> {
-    /// Width and height as it is shown.
+    /// Width and height of the upright image.
     pub fn size(&self) -> (u32, u32) {
         match &self.file {
             File::Jpeg(jpeg) => jpeg.size(),
@@ -67,10 +67,10 @@ impl Inspected<'_> {
         }
     }
 
-    /// Decodes it in the format that a session wants. A frame that is smaller than that stays as it is.
+    /// Decodes the file in the format that a session wants. A smaller image is not enlarged.
     ///
-    /// Allocates at most [`Limits::max_memory`] bytes beside the upload itself and the frame. A thread keeps some of
-    /// them for its next frame, at most 32 MiB.
+    /// Allocates at most [`Limits::max_memory`] bytes besides the upload itself and the frame. A thread keeps some of
+    /// these buffers for its next frame.
     ///
     /// # Errors
     /// See [`IngestError`].
@@ -115,7 +115,7 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Frame, IngestError> {
     })
 }
 
-/// Decodes one uploaded frame as [`Inspected::decode`] does. `format` says the format from the upload's width and
+/// Decodes one uploaded frame as [`Inspected::decode`] does. `format` gives the format for the upload's width and
 /// height.
 ///
 /// # Errors

@@ -29,7 +29,7 @@ impl<'file> Jpeg<'file> {
     pub(super) fn read(bytes: &'file [u8], limits: &Limits) -> Result<Self, IngestError> {
         let damaged = |reason: &str| Format::Jpeg.damaged(reason);
         let markers = Markers::read(bytes).map_err(damaged)?;
-        // A height of 0 would be told after the first scan; no decoder here reads that.
+        // A file with the height 0 tells its height after the first scan (DNL); no decoder here reads that.
         if markers.width == 0 || markers.height == 0 {
             return Err(damaged("its width or its height is 0"));
         }
@@ -45,7 +45,7 @@ impl<'file> Jpeg<'file> {
         })
     }
 
-    /// Width and height as it is shown.
+    /// Width and height of the upright image.
     pub(super) fn size(&self) -> (u32, u32) {
         let stored = (self.markers.width, self.markers.height);
         upright_size(stored, self.orientation)
@@ -60,7 +60,7 @@ impl<'file> Jpeg<'file> {
     ) -> Result<StoredImage<'scratch>, IngestError> {
         let (bytes, markers, orientation) = (self.bytes, &self.markers, self.orientation);
         let source = (markers.width, markers.height);
-        // Before it is turned upright, as the decoder sees it.
+        // The format before the image is turned upright, as the decoder sees it.
         let format = FrameFormat {
             size: upright_size(format.size, orientation),
             has_color: format.has_color && markers.has_usual_chroma(),
@@ -82,8 +82,8 @@ impl<'file> Jpeg<'file> {
     }
 }
 
-/// Luma and chroma, without libjpeg-turbo. zune-jpeg reads the headers of every file, and decodes those that are not
-/// usual.
+/// Luma and chroma, without libjpeg-turbo. zune-jpeg reads the headers of every file, and decodes the files that
+/// rusty_jpeg does not take.
 fn decode_channels<'scratch>(
     bytes: &[u8],
     markers: &Markers,
@@ -124,7 +124,7 @@ fn decode_channels<'scratch>(
         .max(markers.memory_of_components());
     limits.check_memory(memory + file.len() as u64)?;
     if markers.is_sequential() && matches!(stored, Some(ColorSpace::Luma | ColorSpace::YCbCr)) {
-        // What it does not take is left to zune-jpeg, which may.
+        // A file that rusty_jpeg does not take may still be one that zune-jpeg takes.
         if let Ok(channels) = decode_components(file, markers, format, &mut scratch.components) {
             return Ok(channels);
         }
@@ -139,7 +139,7 @@ fn decode_channels<'scratch>(
     )
 }
 
-/// The channels of what a decoder gives as pixels.
+/// Decodes to pixels, and returns their channels.
 fn decode_pixels<'memory>(
     mut decoder: JpegDecoder<ZCursor<&[u8]>>,
     markers: &Markers,
@@ -173,7 +173,8 @@ fn typed(error: DecodeErrors) -> IngestError {
 /// Luma and, where it is wanted and there, chroma.
 type Channels<'memory> = (Channel<'memory>, Option<[Channel<'memory>; 2]>);
 
-/// The reductions that cost less than none, the strongest first. The one to a half is not vectorised.
+/// The reductions that cost less than decoding at full size, the strongest first. The one to a half is missing, since
+/// rusty_jpeg does not vectorise it.
 const REDUCTIONS: [u32; 2] = [8, 4];
 
 /// The channels of a file with one scan, with rusty_jpeg: its components as they are stored, reduced by their inverse
@@ -186,7 +187,7 @@ fn decode_components<'memory>(
 ) -> Result<Channels<'memory>, Error> {
     let mut decoder = Decoder::new(file);
     decoder.set_single_threaded(true);
-    // It takes the last one first.
+    // The decoder takes the last buffer first.
     memory.reverse();
     decoder.recycle_planes(std::mem::take(memory));
     let divisor = markers.reduction(format.size, &REDUCTIONS);

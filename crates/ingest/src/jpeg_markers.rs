@@ -7,7 +7,7 @@ use std::ops::Range;
 /// One component of the frame header: its horizontal and vertical sampling factors.
 type Sampling = (u32, u32);
 
-/// More one-bits than the longest code (16) and the value behind it (16) can use up.
+/// Bytes of one-bits: more bits than the longest code (16) and the value behind it (16) can use up.
 const GUARD_BYTES: usize = 8;
 
 /// What an APP1 segment with an EXIF block begins with.
@@ -18,7 +18,7 @@ const EXIF: &[u8] = b"Exif\0\0";
 pub(super) struct Markers {
     pub(super) width: u32,
     pub(super) height: u32,
-    /// Which start-of-frame marker it has: the last half of its code.
+    /// The low four bits of the code of its start-of-frame marker.
     process: u8,
     components: Vec<Sampling>,
     scans: usize,
@@ -101,7 +101,7 @@ impl Markers {
         None
     }
 
-    /// Whether this is what nearly all files are: baseline, extended or progressive with Huffman codes, one or three
+    /// Whether the file is like nearly all: baseline, extended or progressive with Huffman codes, with one or three
     /// channels, in a layout that zune-jpeg takes.
     #[cfg(feature = "turbo")]
     pub(super) fn is_usual(&self) -> bool {
@@ -110,7 +110,7 @@ impl Markers {
             && self.unsupported(false).is_none()
     }
 
-    /// Whether it is baseline or extended with Huffman codes, in a single scan.
+    /// Whether the file is baseline or extended with Huffman codes, in a single scan.
     pub(super) fn is_sequential(&self) -> bool {
         self.process <= 1 && self.scans == 1
     }
@@ -122,7 +122,8 @@ impl Markers {
     }
 
     /// The largest of these divisors, in falling order, that divides both sides and leaves at least the working size.
-    /// With another one the last column would stand for fewer pixels than the others, and boxes would be off.
+    /// With a divisor that leaves a rest, the last column would stand for fewer pixels than the others, and boxes would
+    /// be off.
     pub(super) fn reduction(&self, working: (u32, u32), divisors: &[u32]) -> u32 {
         let fits = |side: u32, working: u32, divisor: u32| {
             side.is_multiple_of(divisor) && side / divisor >= working
@@ -137,12 +138,12 @@ impl Markers {
         self.process == 2
     }
 
-    /// Whether the decoder can leave colour out. It goes wrong where colour has half the rows but all columns.
+    /// Whether zune-jpeg can leave colour out. It decodes wrongly where colour has half the rows but all columns.
     pub(super) fn can_skip_color(&self) -> bool {
         matches!(self.largest_sampling(), (_, 1) | (2, 2))
     }
 
-    /// Whether chroma has half or all of the luma's columns and rows. In others the decoder garbles it.
+    /// Whether chroma has half or all of the luma's columns and rows. The decoder garbles other chroma.
     pub(super) fn has_usual_chroma(&self) -> bool {
         matches!(self.largest_sampling(), (1 | 2, 1 | 2))
     }
@@ -154,9 +155,9 @@ impl Markers {
 
     /// Copies the image to `guarded`, with one-bits before its end marker. After the end marker the decoder reads
     /// zero-bits without end, and makes gray blocks of them (docs/upstream/zune-jpeg.md). A run of one-bits is a code
-    /// that no Huffman table has (T.81, annex C), so where blocks are missing the decoder must report an error. A whole
-    /// image is decoded before it gets there. The exception are images whose channels come one after the other with
-    /// restarts: there the decoder reads past the end of the last channel.
+    /// that no Huffman table has (T.81, annex C), so where blocks are missing the decoder must report an error. The
+    /// decoder has decoded a whole image before it gets there. Images whose channels come one after the other get no
+    /// guard: with restarts, the decoder reads past the end of the last channel.
     pub(super) fn with_guarded_end(&self, bytes: &[u8], guarded: &mut Vec<u8>) {
         let guard_bytes = if self.is_progressive() || self.scans == 1 {
             GUARD_BYTES
@@ -170,18 +171,18 @@ impl Markers {
         guarded.extend([0xFF, 0xD9]);
     }
 
-    /// Bytes that decoding to pixels allocates at most, with so many bytes a pixel.
+    /// Most bytes that decoding to pixels allocates, with `output_channels` bytes a pixel.
     pub(super) fn memory(&self, output_channels: u64) -> u64 {
         let pixels = u64::from(self.width) * u64::from(self.height);
         pixels * output_channels + self.working_memory()
     }
 
-    /// Bytes that decoding to the components as they are stored allocates at most: whole blocks.
+    /// Most bytes that decoding to the stored components allocates, in whole blocks.
     pub(super) fn memory_of_components(&self) -> u64 {
         self.samples() + self.working_memory()
     }
 
-    /// Bytes beside the output: rows of blocks and, where the image comes in several scans, 16-bit coefficients for
+    /// Bytes besides the output: rows of blocks and, where the image comes in several scans, 16-bit coefficients for
     /// every sample of every component.
     fn working_memory(&self) -> u64 {
         let v_max = self.largest_sampling().1;

@@ -16,10 +16,10 @@
 //! What can go wrong: the bytes are hostile. They may claim a huge size, be cut short, or cost far more to decode than
 //! to send. So the structure of the file is read, and every limit checked, before a pixel is decoded.
 //!
-//! [`inspect`] does that once; what it returns knows the size, and decodes without reading the structure again.
+//! [`inspect`] does that once; the returned value knows the size, and decodes without reading the structure again.
 //!
-//! zune-jpeg reads the headers of every JPEG and decides what is damaged. rusty_jpeg decodes those with one scan, as
-//! the components that are stored, and reduces large ones as it does; with the feature `turbo`, libjpeg-turbo is asked
+//! zune-jpeg reads the headers of every JPEG and decides what is damaged. rusty_jpeg decodes files with one scan to
+//! their stored components, and reduces large images while it decodes. With the feature `turbo`, libjpeg-turbo is tried
 //! first. Both are fast paths: on any error or warning, and for any file that they do not take, zune-jpeg decides.
 //!
 //! ```

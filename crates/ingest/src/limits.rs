@@ -1,4 +1,5 @@
-//! What one frame may cost. Checked against what its header claims, before anything is allocated for it.
+//! What one frame may cost. The limits are checked against the header's claims, before anything is allocated for the
+//! frame.
 
 use super::error::IngestError;
 

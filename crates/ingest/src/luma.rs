@@ -34,7 +34,7 @@ pub(super) fn luma_of(image: DynamicImage) -> GrayImage {
             .pixels()
             .map(|p| to_8_bits(over_black16(p.0[0], p.0[1])))
             .collect(),
-        // RGBA in 16 bits as it is, and whatever else `image` comes to decode.
+        // RGBA in 16 bits, and formats that later versions of `image` may give.
         other => other
             .into_rgba16()
             .pixels()
@@ -47,7 +47,7 @@ pub(super) fn luma_of(image: DynamicImage) -> GrayImage {
     GrayImage::from_raw(width, height, luma).expect("one luma value was made for each pixel")
 }
 
-/// The chroma of a decoded image in half of its columns and rows; none of a gray one.
+/// The chroma of a decoded image in half of its columns and rows; `None` for a gray one.
 pub(super) fn chroma_of(image: &DynamicImage) -> Option<[Vec<u8>; 2]> {
     let size = (image.width(), image.height());
     let blend = |[r, g, b, alpha]: [u8; 4]| [r, g, b].map(|value| over_black(value, alpha));
@@ -70,7 +70,7 @@ pub(super) fn chroma_of(image: &DynamicImage) -> Option<[Vec<u8>; 2]> {
             ycbcr::chroma(size, |i| blend(pixels[i].map(to_8_bits)))
         }
         other => {
-            // Whatever else `image` comes to decode.
+            // Formats that later versions of `image` may give.
             let rgba = other.to_rgba8();
             let pixels = rgba.as_raw().as_chunks::<4>().0;
             ycbcr::chroma(size, |i| blend(pixels[i]))

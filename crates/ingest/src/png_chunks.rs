@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// Why a file is refused that ends before its end marker.
+/// The reason for a file that ends before its end marker.
 pub(super) const CUT_SHORT: &str = "it is cut short";
 
 /// The chunks that pixels and their orientation depend on. Others are left out before decoding: a colour profile or a
@@ -17,7 +17,7 @@ pub(super) struct Png<'a> {
     pub(super) size: (u32, u32),
     /// The EXIF block, where one stands before the pixels.
     pub(super) exif: Option<&'a [u8]>,
-    /// Where the chunks are that decoding needs, joined where they touch.
+    /// The ranges of the chunks that decoding needs; adjacent ones are joined.
     needed: Vec<Range<usize>>,
     has_others: bool,
 }

@@ -1,4 +1,5 @@
-//! Bits and prefix codes of lossless WebP (RFC 9649, section 3.7), as far as they must be read to know what they cost.
+//! Bits and prefix codes of lossless WebP (RFC 9649, section 3.7), as far as they must be read to know how much memory
+//! they take.
 
 /// Longest code in bits.
 const MAX_LENGTH: usize = 15;
@@ -6,9 +7,9 @@ const MAX_LENGTH: usize = 15;
 const ORDER: [usize; 19] = [
     17, 18, 0, 1, 2, 3, 4, 5, 16, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15,
 ];
-/// Codes up to this length have entries in the decoder's table; longer ones have nodes.
+/// Codes up to this length in bits have entries in the decoder's table; longer ones have nodes.
 const TABLE_BITS: usize = 10;
-/// Bytes of an entry of the decoder's table, and bytes of nodes for each code that is not in it.
+/// Bytes of an entry of the decoder's table, and bytes of nodes for each code that is not in the table.
 const ENTRY: u64 = 4;
 const NODES: u64 = 4 * 16;
 
@@ -23,7 +24,7 @@ impl<'a> Bits<'a> {
         Self { bytes, at: 0 }
     }
 
-    /// The next bit; none at the end.
+    /// The next bit; `None` at the end.
     pub(super) fn bit(&mut self) -> Option<usize> {
         let byte = *self.bytes.get(self.at / 8)?;
         let bit = byte >> (self.at % 8) & 1;
@@ -31,7 +32,7 @@ impl<'a> Bits<'a> {
         Some(usize::from(bit))
     }
 
-    /// The next number of so many bits.
+    /// The next number of `count` bits.
     pub(super) fn number(&mut self, count: usize) -> Option<usize> {
         (0..count).try_fold(0, |number, place| Some(number | self.bit()? << place))
     }
@@ -39,7 +40,7 @@ impl<'a> Bits<'a> {
 
 /// A prefix code.
 pub(super) struct Code {
-    /// How many codes have each length; none, where there is a single symbol, which takes no bit.
+    /// How many codes have each length in bits; all 0 where there is a single symbol, which takes no bit.
     counts: [u16; MAX_LENGTH + 1],
     /// The symbols in the order of their codes.
     symbols: Vec<u16>,
@@ -107,7 +108,7 @@ impl Code {
             0 => return None,
             1 => counts = [0; MAX_LENGTH + 1],
             _ => {
-                // Every sequence of bits is a code.
+                // The code must be complete: every sequence of bits starts with a code.
                 let share = |length: usize| usize::from(counts[length]) << (MAX_LENGTH - length);
                 let used: usize = (1..=MAX_LENGTH).map(share).sum();
                 if used != 1 << MAX_LENGTH {
@@ -137,7 +138,7 @@ impl Code {
         None
     }
 
-    /// Bytes that the decoder allocates for it, at most.
+    /// Most bytes that the decoder allocates for this code.
     pub(super) fn memory(&self) -> u64 {
         let longest = self.counts.iter().rposition(|&count| count > 0);
         let entries = longest.map_or(0, |longest| 1 << longest.min(TABLE_BITS));

@@ -63,7 +63,7 @@ impl<'file> WebPFile<'file> {
             .map_err(|error| typed(Format::WebP, error))?;
         let (width, height) = decoder.dimensions();
         if width == 0 || height == 0 {
-            // image-webp keeps 14 bits of a lossless side, so that of 16,384 pixels, which is the longest, becomes 0.
+            // image-webp keeps 14 bits of a lossless side, so the longest side, of 16,384 pixels, becomes 0.
             return Err(Format::WebP.damaged("its width or its height is 0, or 16384"));
         }
         limits.check_size(width, height)?;
@@ -75,7 +75,7 @@ impl<'file> WebPFile<'file> {
         })
     }
 
-    /// Width and height as it is shown.
+    /// Width and height of the upright image.
     pub(super) fn size(&self) -> (u32, u32) {
         upright_size(self.decoder.dimensions(), self.orientation)
     }

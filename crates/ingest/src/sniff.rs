@@ -29,7 +29,7 @@ impl Format {
 }
 
 /// Types that are known and not read, by the brands of their `ftyp` box. HEIC is an iPhone's, AVIF Android's and the
-/// web's. A file with a general brand names its own one among those that it is compatible with.
+/// web's. A file with a general major brand names its own type among its compatible brands.
 const HEIC: [&[u8; 4]; 8] = [
     b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"hevm", b"hevs",
 ];
@@ -38,13 +38,14 @@ const GENERAL: [&[u8; 4]; 4] = [b"mif1", b"mif2", b"msf1", b"miaf"];
 /// Most brands that are looked at.
 const MAX_BRANDS: usize = 16;
 
-/// The name of the image type that the first bytes tell, also of one that is not read.
+/// The name of the image type that the first bytes tell, even of a type that is not read.
 pub fn type_name(bytes: &[u8]) -> Option<&'static str> {
     let read = format(bytes).map(Format::name);
     read.or_else(|| unread_type(bytes))
 }
 
-/// Bytes of a packet of an MPEG transport stream, those that cameras put before it, and the first one of each.
+/// Bytes of a packet of an MPEG transport stream; bytes of the time stamp that cameras put before each; a packet's
+/// first byte.
 const PACKET: usize = 188;
 const STAMP: usize = 4;
 const SYNC: u8 = 0x47;
@@ -89,8 +90,8 @@ pub fn unread_type(bytes: &[u8]) -> Option<&'static str> {
     found.or_else(|| of_parts.iter().find(|(is, _)| *is).map(|(_, name)| *name))
 }
 
-/// Whether all is text in UTF-8, which may be cut off: images and videos have control characters from their first bytes
-/// on.
+/// Whether the bytes are text in UTF-8, which may be cut off. Images and videos have control characters in their first
+/// bytes.
 pub fn is_text(bytes: &[u8]) -> bool {
     let is_utf8 =
         std::str::from_utf8(bytes).map_or_else(|error| error.error_len().is_none(), |_| true);
@@ -98,10 +99,10 @@ pub fn is_text(bytes: &[u8]) -> bool {
     is_utf8 && !bytes.is_empty() && bytes.iter().all(is_letter)
 }
 
-/// Least letters that are told to be base64: fewer may be a name.
+/// Least length of a text that counts as base64: a shorter one may be a name.
 const MIN_BASE64: usize = 128;
 
-/// Whether all is base64, in the standard alphabet or that of URLs, in lines or not; or a data URL with it.
+/// Whether the bytes are base64, in the standard alphabet or that of URLs, in lines or not, or a data URL with base64.
 pub fn is_base64(bytes: &[u8]) -> bool {
     const MARK: &[u8] = b";base64,";
     let head = &bytes[..bytes.len().min(64)];
@@ -114,7 +115,7 @@ pub fn is_base64(bytes: &[u8]) -> bool {
     text.len() >= MIN_BASE64 && text.iter().all(is_letter)
 }
 
-/// Which still image a file of boxes is; none where it is a video.
+/// The type of still image of a file of ISO boxes; `None` where it is a video.
 fn still_image(bytes: &[u8]) -> Option<&'static str> {
     let length = bytes
         .first_chunk()
@@ -122,7 +123,7 @@ fn still_image(bytes: &[u8]) -> Option<&'static str> {
     let brands = bytes.get(8..bytes.len().min(length as usize))?;
     let mut brands = brands.chunks_exact(4);
     let major = brands.next()?;
-    // After the version, which is one of the chunks.
+    // The minor version comes first; as one of the chunks it names no known brand.
     let compatible = brands.take(MAX_BRANDS);
     let name = |brand: &[u8]| {
         let is_of = |brands: &[&[u8; 4]]| brands.iter().any(|known| *known == brand);
@@ -137,7 +138,7 @@ fn still_image(bytes: &[u8]) -> Option<&'static str> {
     name(major).or_else(general)
 }
 
-/// The type that the signature at the start of `bytes` tells, if it is one of ours.
+/// The type that the signature at the start of `bytes` tells, if it is one that is read.
 pub(super) fn format(bytes: &[u8]) -> Option<Format> {
     if bytes.starts_with(&[0xFF, 0xD8, 0xFF]) {
         Some(Format::Jpeg)

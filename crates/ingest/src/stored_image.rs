@@ -8,7 +8,7 @@ use image::metadata::Orientation;
 use image::{DynamicImage, GrayImage};
 use std::borrow::Cow;
 
-/// Bytes of a buffer that a thread keeps: enough for the luma of a frame of 4096 x 4096.
+/// Most bytes of a buffer that a thread keeps: enough for the luma of a frame of 4096 x 4096.
 const MAX_KEPT_BYTES: usize = 16 << 20;
 
 /// The memory of a frame's luma, Cb and Cr.
@@ -19,7 +19,7 @@ pub(super) type Planes = [Vec<u8>; 3];
 pub(super) struct Scratch {
     /// The file as the decoder gets it.
     pub(super) file: Vec<u8>,
-    /// Decoded values. Those behind the values of this frame are left from an earlier one.
+    /// Decoded values. Those behind this frame's are left from an earlier frame.
     pub(super) pixels: Vec<u8>,
     /// Decoded components, likewise.
     pub(super) components: Vec<Vec<u8>>,
@@ -28,7 +28,7 @@ pub(super) struct Scratch {
 }
 
 impl Scratch {
-    /// Frees what an unusually large frame took.
+    /// Frees the buffers that an unusually large frame has enlarged.
     pub(super) fn trim(&mut self) {
         let components = self.components.iter_mut();
         for buffer in components.chain([&mut self.file, &mut self.pixels]) {
@@ -53,12 +53,12 @@ pub(super) struct StoredImage<'a> {
     pub(super) chroma: Option<[Channel<'a>; 2]>,
     /// Width and height of the image in the file: larger than the luma where the decoder has reduced it.
     pub(super) source: (u32, u32),
-    /// How it is to be turned.
+    /// How the image is to be turned and mirrored to be upright.
     pub(super) orientation: Orientation,
 }
 
 impl StoredImage<'_> {
-    /// Turns it upright and reduces it to `format`, in the memory of `planes`.
+    /// Turns the image upright and reduces it to `format`, in the memory of the given planes.
     pub(super) fn into_frame(
         self,
         format: FrameFormat,
@@ -69,7 +69,7 @@ impl StoredImage<'_> {
             channel.upright(self.orientation).resized(size, memory)
         };
         let of_luma = upright_size(self.luma.size, self.orientation);
-        // Frames of another size than the session's are decoded too, and refused there.
+        // Frames that are smaller than the session's are decoded too, and the session refuses them.
         let size = (format.size.0.min(of_luma.0), format.size.1.min(of_luma.1));
         let half = ycbcr::chroma_size(size);
         let luma = upright(self.luma, size, luma);
@@ -89,7 +89,8 @@ impl Channel<'_> {
         self
     }
 
-    /// The area average in `size`, in the given memory. Along a side that is to be longer values are repeated.
+    /// The channel in `size`, in the given memory: the area average, and along a side that has to become longer
+    /// repeated values.
     fn resized(self, size: (u32, u32), mut memory: Vec<u8>) -> Vec<u8> {
         memory.clear();
         if self.size == size {
@@ -115,7 +116,7 @@ impl Channel<'_> {
     }
 }
 
-/// The orientation that an EXIF block (from its TIFF header on) notes; upright where it says nothing readable.
+/// The orientation that an EXIF block (from its TIFF header on) notes; no turning where the block has no readable note.
 pub(super) fn orientation_of(exif: Option<&[u8]>) -> Orientation {
     exif.and_then(Orientation::from_exif_chunk)
         .unwrap_or(Orientation::NoTransforms)

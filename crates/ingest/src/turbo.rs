@@ -1,7 +1,7 @@
-//! JPEG with libjpeg-turbo: its own channels, reduced by their inverse DCT.
+//! JPEG with libjpeg-turbo: the stored channels, reduced by their inverse DCT.
 //!
-//! What can go wrong: it turns missing data into gray blocks, with a warning only. So this is a fast path: on any
-//! warning, and for every layout that zune-jpeg refuses, zune-jpeg decides.
+//! What can go wrong: libjpeg-turbo turns missing data into gray blocks, with a warning only. So this is a fast path:
+//! on any warning, and for every layout that zune-jpeg refuses, zune-jpeg decides.
 
 use super::jpeg_markers::Markers;
 use super::limits::{Limits, MAX_JPEG_SCANS};
@@ -11,7 +11,7 @@ use image::metadata::Orientation;
 use std::borrow::Cow;
 use turbojpeg::{Colorspace, Decompressor, Image, PixelFormat, ScalingFactor, Subsamp, YuvImage};
 
-/// The reductions for which it has vector instructions, the strongest first.
+/// The reductions for which libjpeg-turbo has vector instructions, the strongest first.
 const REDUCTIONS: [u32; 3] = [8, 4, 2];
 
 /// The sizes of the planes that were decoded, one after the other.
@@ -20,7 +20,7 @@ pub(super) struct DecodedPlanes {
     pub(super) luma: (u32, u32),
     /// Where Cb begins; Cr follows.
     chroma_at: usize,
-    /// Of Cb and of Cr.
+    /// The size of Cb and of Cr.
     chroma: Option<(u32, u32)>,
 }
 
@@ -53,7 +53,7 @@ fn area((width, height): (u32, u32)) -> usize {
     width as usize * height as usize
 }
 
-/// Decodes to the smallest size that is not smaller than that of `format`, to the start of `pixels`. None where
+/// Decodes to the smallest size that is not smaller than that of `format`, to the start of `pixels`. `None` where
 /// zune-jpeg is to decide.
 pub(super) fn decode(
     bytes: &[u8],
@@ -66,7 +66,7 @@ pub(super) fn decode(
     if !markers.is_usual() || limits.check_memory(memory).is_err() {
         return None;
     }
-    // A new one each time: it would lend the tables of one file to the next one that has none.
+    // A new decompressor for each file: a used one would lend the tables of its file to the next file without tables.
     let mut decompressor = new_decompressor()?;
     let size = (markers.width, markers.height);
     let reduction = match markers.reduction(format.size, &REDUCTIONS) {
@@ -90,11 +90,11 @@ pub(super) fn decode(
         (Subsamp::Sub2x1, Colorspace::YCbCr) => (2, 1),
         (Subsamp::Sub1x2, Colorspace::YCbCr) => (1, 2),
         (Subsamp::Sub2x2, Colorspace::YCbCr) => (2, 2),
-        // Any other one is rare.
+        // Other layouts are rare.
         _ => return None,
     });
     let chroma = subsampling.map(|(x, y)| (luma.0.div_ceil(x), luma.1.div_ceil(y)));
-    // The luma that comes with chroma is a whole number of its pixels.
+    // With chroma, the sides of the luma are padded to a whole number of chroma pixels.
     let padded = subsampling.map_or(luma, |(x, y)| {
         (luma.0.next_multiple_of(x), luma.1.next_multiple_of(y))
     });

@@ -1,4 +1,4 @@
-//! What the prefix codes of a lossless WebP (VP8L, RFC 9649) take in memory.
+//! How much memory the prefix codes of a lossless WebP (VP8L, RFC 9649) take.
 //!
 //! Such an image may have up to 65,536 groups of five codes. A group of some bytes can describe codes for which the
 //! decoder allocates a hundred kilobytes, and no header tells how many groups there are. So the file is read up to its
@@ -11,7 +11,7 @@
 
 use super::prefix_codes::{Bits, Code};
 
-/// Bytes for a group beside its codes: their headers, in a list that doubles as it grows.
+/// Bytes for a group besides its codes: the codes' headers, in a list that doubles as it grows.
 const GROUP: u64 = 1 << 10;
 /// Symbols of the five codes; colours that were seen before are symbols of the first, too.
 const ALPHABETS: [usize; 5] = [256 + 24, 256, 256, 256, 40];
@@ -19,8 +19,9 @@ const FIRST_LENGTH: u16 = 256;
 const FIRST_SEEN_COLOR: u16 = FIRST_LENGTH + 24;
 const SIGNATURE: usize = 0x2f;
 
-/// Bytes that the codes of the image in a `VP8L` chunk take: exactly, or more than `most`. None, where they cannot be
-/// read, or the image has another size: its own one is up to the sender, and so is the time to walk through it.
+/// Bytes that the codes of the image in a `VP8L` chunk take: exact, or some number above `most`. `None` where the codes
+/// cannot be read, or the image has another size. An unchecked size would let the sender choose how long the walk
+/// through the image takes.
 pub(super) fn memory_of_codes(data: &[u8], size: (usize, usize), most: u64) -> Option<u64> {
     let mut bits = Bits::new(data);
     if bits.number(8)? != SIGNATURE {
@@ -29,12 +30,13 @@ pub(super) fn memory_of_codes(data: &[u8], size: (usize, usize), most: u64) -> O
     if size != (1 + bits.number(14)?, 1 + bits.number(14)?) {
         return None;
     }
-    // Whether alpha is used, and the version.
+    // The bit for alpha, and the version.
     bits.number(4)?;
     walk(&mut bits, size, most)
 }
 
-/// The same of the alpha channel in an `ALPH` chunk, for an image of this size.
+/// Bytes that the codes of the alpha channel in an `ALPH` chunk take, for an image of this size; as in
+/// [`memory_of_codes`].
 pub(super) fn memory_of_alpha_codes(data: &[u8], size: (usize, usize), most: u64) -> Option<u64> {
     let (header, data) = data.split_first()?;
     match header & 3 {
@@ -43,7 +45,7 @@ pub(super) fn memory_of_alpha_codes(data: &[u8], size: (usize, usize), most: u64
     }
 }
 
-/// Walks through an image up to the last code of its pixels, or to the one that is beyond `most` bytes.
+/// Walks through an image up to the last code of its pixels, or until the codes take more than `most` bytes.
 fn walk(bits: &mut Bits, (mut width, height): (usize, usize), most: u64) -> Option<u64> {
     let mut seen = [false; 4];
     while bits.bit()? == 1 {
@@ -94,7 +96,7 @@ fn blocks(side: usize, bits: usize) -> usize {
     side.div_ceil(1 << bits)
 }
 
-/// How many colours seen before can be named.
+/// The size of the cache of colours that were seen before; 0 without one.
 fn read_seen_colors(bits: &mut Bits) -> Option<usize> {
     match bits.bit()? {
         0 => Some(0),
@@ -116,8 +118,8 @@ fn read_group(bits: &mut Bits, seen_colors: usize) -> Option<[Code; 5]> {
     ])
 }
 
-/// Reads an image with one group of codes. Returns the largest number in the red and green of its pixels: what is
-/// copied was there before.
+/// Reads an image with one group of codes. Returns the largest number in the red and green of its pixels. Copied pixels
+/// repeat earlier ones, so they are not looked at.
 fn read_pixels(bits: &mut Bits, width: usize, height: usize) -> Option<usize> {
     let seen_colors = read_seen_colors(bits)?;
     let codes = read_group(bits, seen_colors)?;

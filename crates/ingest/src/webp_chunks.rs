@@ -1,9 +1,9 @@
 //! The chunk structure of WebP, read before decoding: whether the file is whole, and what decoding it takes. The
 //! decoder would not notice a missing end, or would allocate as many bytes as a chunk claims.
 //!
-//! What counts is what image-webp 0.2.4 decodes: of a simple file its first chunk; of an extended one the first chunk
-//! of each kind, or the first frame of its animation. Each image has to have the size that the file says elsewhere: the
-//! decoder compares them too, but not before it has decoded.
+//! Only what image-webp 0.2.4 decodes counts: of a simple file the first chunk; of an extended file the first chunk of
+//! each kind, or the first frame of the animation. The size in an image's own header has to be that of the canvas or
+//! frame: the decoder compares them too, but only after decoding.
 
 use super::png_chunks::CUT_SHORT;
 use super::vp8l;
@@ -13,19 +13,19 @@ const HEADER: usize = 8;
 const FRAME_HEADER: usize = 16;
 /// The bit of an animation in the first byte of `VP8X`.
 const ANIMATION: u8 = 1 << 1;
-/// What a lossy key frame has before its size, after the three bytes of its tag.
+/// These bytes follow the three bytes of a lossy key frame's tag, before its size.
 const START_CODE: [u8; 3] = [0x9d, 0x01, 0x2a];
 
 /// Width and height.
 type Size = (usize, usize);
 
-/// What decoding a WebP takes beside its output.
+/// The images of a WebP, from which the memory of decoding besides the output follows.
 #[derive(Debug)]
 pub(super) struct WebP<'a> {
-    /// The file, without what comes after it.
+    /// The file without bytes after its end.
     pub(super) file: &'a [u8],
     still: Images<'a>,
-    /// Of the first frame of an animation.
+    /// The images of the first frame of an animation.
     frame: Option<Images<'a>>,
 }
 
@@ -35,7 +35,7 @@ struct Images<'a> {
     lossy: Option<&'a [u8]>,
     lossless: Option<&'a [u8]>,
     alpha: Option<&'a [u8]>,
-    /// Their size, where it is not the canvas.
+    /// Their size, where it is not that of the canvas.
     size: Option<Size>,
 }
 
@@ -74,12 +74,12 @@ impl<'a> WebP<'a> {
         still + if is_animated { 8 } else { 0 }
     }
 
-    /// Bytes that the prefix codes of its lossless parts take, in an image of this size: exactly, or more than `most`.
-    /// None, where they cannot be read, or an image has another size.
+    /// Bytes that the prefix codes of its lossless parts take, in an image of this size: exact, or some number above
+    /// `most`. `None` where the codes cannot be read, or an image has another size.
     pub(super) fn memory_of_codes(&self, (width, height): (u32, u32), most: u64) -> Option<u64> {
         let canvas = (width as usize, height as usize);
         let all = std::iter::once(&self.still).chain(&self.frame);
-        // One after the other is decoded.
+        // The images are decoded one after the other, so the largest counts.
         all.map(|images| images.memory_of_codes(canvas, most))
             .try_fold(0, |largest, memory| Some(memory?.max(largest)))
     }
@@ -97,8 +97,8 @@ impl<'a> Images<'a> {
         place.get_or_insert(data);
     }
 
-    /// Those of an `ANMF` chunk: its first one, or after an alpha channel the next, whatever its name. Where the file
-    /// is no animation, the decoder takes them for chunks of the file, of which none was there before.
+    /// The chunks of an image in an `ANMF` chunk: the first and, after an alpha channel, the next whatever its name.
+    /// Where the file is no animation, the decoder takes them as chunks of the file of their kinds.
     fn of_frame(data: &'a [u8], is_animation: bool) -> Self {
         let side = |at: usize| {
             let [low, middle, high] = *data.get(at..)?.first_chunk()?;

@@ -5,48 +5,48 @@ use std::ffi::{OsStr, OsString};
 use std::io::{PipeReader, PipeWriter};
 use std::process::{Child, Command, Stdio};
 
-/// By how much lower its priority is: that of other slow work.
+/// The decoder's niceness, which is that of other slow work.
 #[cfg(target_os = "linux")]
 const NICENESS: i32 = 10;
-/// What the launcher ends with where it cannot start the program.
+/// The exit status of the launcher where it cannot start the program.
 pub(super) const NOT_STARTED: i32 = 127;
-/// Most bytes of a file that it writes: what it keeps of a pipe, to go back in it.
+/// Most bytes of a file that the decoder writes: its copy of the pipe, in which it can seek back.
 #[cfg(target_os = "linux")]
 const MAX_FILE: u64 = 1 << 30;
 #[cfg(target_os = "linux")]
 const MAX_FILES: u64 = 64;
 
-/// What starts the decoder: a program with its own arguments before the decoder's name, which gives up rights and
-/// becomes it. Without words the decoder is started by itself.
+/// The program that starts the decoder: it gives up rights and then executes the decoder, whose command line follows
+/// its own arguments. Without words the decoder is started directly.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Launcher {
     /// The program and its arguments.
     pub words: Vec<OsString>,
-    /// Whether the decoder can open no file then but the system's programs and libraries, and write none at all. It
-    /// gets the video as a file without a name, and may read files; otherwise it gets a pipe, and may only keep what it
-    /// has read from that.
+    /// Whether the launcher lets the decoder open no files but the system's programs and libraries, and write none.
+    /// Then the decoder may use the protocol for files, and gets the video as a file without a name. Otherwise it gets
+    /// a pipe, and may only cache what it has read from it.
     pub hides_files: bool,
 }
 
 /// Whose video it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Trust {
-    /// Somebody else's: decoding may take so much, and no more.
+    /// Somebody else's: memory and processor time are limited.
     Foreign,
-    /// That of the person who runs this, who may have all of the machine.
+    /// A video of the person who runs the program, who may use all of the machine.
     Own,
 }
 
-/// The program, and the pipe for what it says.
+/// The process, and the pipe of its standard error.
 pub(super) struct Started {
     pub(super) child: Child,
     pub(super) said: PipeReader,
-    /// The end at which it says it. As long as this is here, the other one has no end.
+    /// The writing end of that pipe. As long as it is open, the reading end does not come to an end.
     pub(super) saying: PipeWriter,
 }
 
-/// Starts the program with this input, and pipes for its pictures and what it says. It gets nothing of the environment,
-/// which may have secrets, but the path.
+/// Starts the program with this input, and with pipes for its output and its standard error. Of the environment, which
+/// may have secrets, it gets only `PATH`.
 pub(super) fn start<A: AsRef<OsStr>>(
     launcher: &Launcher,
     program: &str,
@@ -71,7 +71,8 @@ pub(super) fn start<A: AsRef<OsStr>>(
     if let Some(path) = std::env::var_os("PATH") {
         command.env("PATH", path);
     }
-    // Ctrl-C goes to the whole group of the terminal. Whoever wants the pictures decides when this ends.
+    // Ctrl-C goes to the whole group of the terminal. The decoder has its own group, since the reader of the pictures
+    // decides when it ends.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     let (said, saying) = std::io::pipe().map_err(not_started)?;
@@ -86,7 +87,7 @@ pub(super) fn start<A: AsRef<OsStr>>(
     })
 }
 
-/// Sets the limits. Where that fails the program has ended already.
+/// Sets the limits. Setting them fails only where the process has ended already.
 #[cfg(target_os = "linux")]
 fn limit(child: &Child, trust: Trust) {
     use rustix::process::{Pid, Resource, Rlimit, prlimit, setpriority_process};
@@ -110,11 +111,11 @@ fn limit(child: &Child, trust: Trust) {
     }
 }
 
-/// Elsewhere a process cannot be limited from outside.
+/// On other systems a process cannot be limited from outside.
 #[cfg(not(target_os = "linux"))]
 fn limit(_child: &Child, _trust: Trust) {}
 
-/// A file of these bytes that has no name; none where the system has no such files.
+/// A file of these bytes that has no name; `None` where the system has no such files.
 #[cfg(target_os = "linux")]
 pub(super) fn nameless(bytes: &[u8]) -> Option<Stdio> {
     use rustix::fs::{MemfdFlags, memfd_create};
@@ -124,7 +125,7 @@ pub(super) fn nameless(bytes: &[u8]) -> Option<Stdio> {
     Some(file.into())
 }
 
-/// Elsewhere there are none.
+/// Other systems have no such files.
 #[cfg(not(target_os = "linux"))]
 pub(super) fn nameless(_bytes: &[u8]) -> Option<Stdio> {
     None

@@ -1,4 +1,4 @@
-//! A video being decoded: the process, and the threads that feed it and hear what it says.
+//! A video being decoded: the process, and the threads that write its input and read its standard error.
 
 use super::child::{self, Launcher, Started, Trust};
 use super::error::{Cost, VideoError};
@@ -19,10 +19,10 @@ use std::thread::{self, JoinHandle};
 const FORMATS: &str = "mov,matroska,gif,mjpeg";
 /// The codecs of these, by the names of their decoders.
 const CODECS: &str = "h264,hevc,vp8,vp9,av1,libdav1d,libaom-av1,mpeg4,h263,mjpeg,gif";
-/// The file without a name that is the program's input, which it can go back in.
+/// The program's input as a file without a name, in which it can seek back.
 const NAMELESS: &str = "file:/proc/self/fd/0";
-/// The program counts the pixels of a picture with a width that is rounded up to 64. So many more are let through here,
-/// as for a height of 8192; whoever decodes the picture compares its own size with the limit.
+/// The program counts the pixels of a picture with a width that is rounded up to 64. The limit is raised by as much as
+/// that adds for a height of 8192. The decoder of the JPEG file compares the picture's own size with the limit.
 const PADDING: u64 = 63 * 8192;
 /// More pictures than any video has.
 const MAX_PICTURES: usize = 1 << 30;
@@ -37,23 +37,24 @@ pub struct VideoLimits {
     pub max_pixels: u64,
     /// Most bytes of a picture.
     pub max_bytes: usize,
-    /// Most pictures; one more tells that there are more.
+    /// Most pictures that are wanted; the decoder gives one more if there are more.
     pub max_pictures: usize,
 }
 
 /// What is decoded.
 #[derive(Debug, Clone)]
 enum Source {
-    /// Bytes, by a program that this starts.
+    /// Bytes of an upload, with the launcher of the program and the video's format.
     Bytes(Launcher, Bytes, VideoFormat),
-    /// A file of this machine, from a picture on that is shown within these seconds after its start time.
+    /// The URL of a file of this machine, and where to begin: at a picture that is shown within these seconds after the
+    /// file's start time.
     File(OsString, Option<Range<f64>>),
 }
 
-/// What the program is to take for damage.
+/// What the program is to treat as damage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Strictness {
-    /// All that it finds: it ends there, in place of leaving pictures out.
+    /// All damage that it finds: it ends there, and leaves no pictures out.
     All,
     /// All but a picture that others are made from and that is missing, as at the start of a video that was cut where
     /// pictures before the cut are needed. The program leaves out those that it cannot make.
@@ -63,7 +64,7 @@ enum Strictness {
 /// A video being decoded. The process ends when this is dropped.
 #[derive(Debug)]
 pub struct VideoDecoder {
-    /// What it can begin anew with, until a picture is there.
+    /// The source, with which it can begin anew until the first picture is there.
     source: Option<Source>,
     limits: VideoLimits,
     program: String,
@@ -71,7 +72,7 @@ pub struct VideoDecoder {
     running: Arc<Mutex<Running>>,
     pictures: BufReader<ChildStdout>,
     said: Said,
-    /// Where the program says it, until a picture is there.
+    /// The writing end of the program's standard error, until the first picture is there.
     saying: Option<PipeWriter>,
     hearing: Option<JoinHandle<()>>,
     /// Pictures that are shown before this are passed over, in seconds after the file's start time.
@@ -84,7 +85,7 @@ pub struct VideoDecoder {
 #[derive(Debug)]
 struct Running {
     child: Child,
-    /// Whether one that replaces it has to end, too.
+    /// Whether a process that replaces this one has to end, too.
     is_stopped: bool,
 }
 
@@ -101,8 +102,8 @@ impl Drop for Stop {
 }
 
 impl VideoDecoder {
-    /// Begins to decode these bytes with this program, which `launcher` starts where it has any words. It may take as
-    /// long as copying the bytes.
+    /// Begins to decode these bytes with this program, which `launcher` starts where it has any words. May block for as
+    /// long as it takes to copy the bytes.
     ///
     /// # Errors
     /// The program cannot be started.
@@ -147,7 +148,7 @@ impl VideoDecoder {
         } = source.start(program, limits, strictness)?;
         let stdout = child.stdout.take();
         let stdout = stdout.expect("the command says that it is a pipe");
-        // The thread outlives neither the process nor, before a first picture, this.
+        // The thread ends once the process has ended and, before the first picture, `saying` is dropped.
         let said = Said::new(strictness == Strictness::AllButReferences);
         let heard = said.clone();
         let hearing = thread::spawn(move || heard.hear(BufReader::new(pipe)));
@@ -169,11 +170,12 @@ impl VideoDecoder {
         })
     }
 
-    /// Begins anew with this, where first pictures could not be made. What stops the process goes on to do so.
+    /// Begins anew with this source, where the first pictures could not be decoded. Each [`Stop`] stops the new
+    /// process, too.
     fn start_again(&mut self, source: Source) -> Result<(), VideoError> {
         end(&mut lock(&self.running).child);
         let (source, strictness, from) = match source {
-            // They are wanted. From the file's beginning on all can be made.
+            // These pictures are wanted. Decoded from the file's beginning, all can be made.
             Source::File(url, Some(from)) => {
                 let whole = Source::File(url, None);
                 (whole, Strictness::All, Some(from.start))
@@ -185,7 +187,7 @@ impl VideoDecoder {
         let mut running = lock(&self.running);
         mem::swap(&mut running.child, &mut lock(&again.running).child);
         if running.is_stopped {
-            // While it was started.
+            // It was stopped while the new process was started.
             end(&mut running.child);
         }
         drop(running);
@@ -194,12 +196,12 @@ impl VideoDecoder {
         Ok(())
     }
 
-    /// What ends the process when it is dropped, also while another thread waits for a picture.
+    /// A handle that ends the process when it is dropped, even while another thread waits for a picture.
     pub fn stop(&self) -> Stop {
         Stop(self.running.clone())
     }
 
-    /// The next picture; none after the last.
+    /// The next picture; `None` after the last.
     ///
     /// # Errors
     /// The rest cannot be decoded.
@@ -223,8 +225,8 @@ impl VideoDecoder {
         }
     }
 
-    /// Whether first pictures could not be made, and others can be had by beginning anew: a picture is missing that
-    /// they are made from, which H.264 tells and H.265 passes over.
+    /// Whether the first pictures could not be decoded for want of a reference picture, and beginning anew helps.
+    /// Decoders of H.264 report the missing reference; those of H.265 skip the pictures silently.
     fn misses_first(
         &self,
         source: &Source,
@@ -234,7 +236,7 @@ impl VideoDecoder {
             (Source::File(_, Some(range)), Ok(Some(picture))) => {
                 picture.time >= range.end - range.start
             }
-            // Where the last picture is made from ones before, which may be all that is left.
+            // No picture came: the last ones of the file may need references before the start.
             (Source::File(_, Some(_)), Ok(None)) => true,
             (_, Ok(_)) => false,
             (_, Err(_)) => {
@@ -252,11 +254,11 @@ impl VideoDecoder {
             drop(saying);
             return self.end();
         }
-        // What was said before the first picture tells whether to begin anew, which is too late with the second one.
+        // Messages before the first picture tell whether to begin anew, which is too late after the second one.
         if let Some(saying) = saying {
             self.said.catch_up(saying);
         }
-        // Where the program goes on after damage, pictures have unknown numbers.
+        // Where the program goes on after damage, the numbers of its pictures are unknown.
         if let Some(fault) = self.said.fault() {
             return Err(self.error(fault));
         }
@@ -264,7 +266,7 @@ impl VideoDecoder {
         Ok(picture)
     }
 
-    /// Whether the pictures that were given are all.
+    /// After the last picture: an error unless the video was decoded to its end.
     fn end(&mut self) -> Result<Option<VideoPicture>, VideoError> {
         let Some(hearing) = self.hearing.take() else {
             return Ok(None);
@@ -307,7 +309,7 @@ impl VideoDecoder {
 }
 
 impl Source {
-    /// Starts the program. What it reads comes by itself.
+    /// Starts the program, and a thread that writes its input where that is a pipe.
     fn start(
         &self,
         program: &str,
@@ -341,7 +343,8 @@ impl Source {
             true => child::nameless(bytes),
             false => None,
         };
-        // MP4 files may have their index at the end. Without a file the cache makes it possible to go back in a pipe.
+        // MP4 files may have their index at the end. With a pipe, ffmpeg's protocol `cache` makes it possible to seek
+        // back.
         let (protocols, source) = match (is_container, &file) {
             (false, _) => ("pipe", &["-f", "mjpeg", "-i", "pipe:0"][..]),
             (true, Some(_)) => ("file", &["-i", NAMELESS][..]),
@@ -361,7 +364,7 @@ impl Source {
         let stdin = started.child.stdin.take();
         let mut stdin = stdin.expect("the command says that it is a pipe");
         let bytes = bytes.clone();
-        // It does not outlive the process. A program that has seen enough closes its input.
+        // The thread does not outlive the process. A program that has read enough closes its input.
         thread::spawn(move || {
             let _ = stdin.write_all(&bytes);
         });
@@ -378,7 +381,7 @@ fn arguments(input: &[&OsStr], limits: VideoLimits, strictness: Strictness) -> V
         Strictness::All => &["-xerror", "-err_detect", "explode"][..],
         Strictness::AllButReferences => &["-xerror"],
     };
-    // Not a picture of the cover, which may stand before the first track.
+    // `V` leaves out cover pictures, which may come before the first track.
     let chosen = [
         "-map",
         "0:V:0",
@@ -387,7 +390,7 @@ fn arguments(input: &[&OsStr], limits: VideoLimits, strictness: Strictness) -> V
         "-frames:v",
         &count,
     ];
-    // The encoder refuses two pictures in the time of one. The colours of a JPEG file are those of BT.601 in full
+    // The encoder refuses two pictures with the same time. The colours of a JPEG file are those of BT.601 in full
     // range.
     let filters = "setpts='if(isnan(PREV_OUTPTS),PTS,max(PTS,PREV_OUTPTS+1))',scale=out_color_matrix=bt601:out_range=full";
     let coded = [
@@ -408,14 +411,14 @@ fn arguments(input: &[&OsStr], limits: VideoLimits, strictness: Strictness) -> V
     options.chain(input).chain(output).collect()
 }
 
-/// Whether the system ended it, as it does after its processor time.
+/// Whether a signal ended the process, as after its processor time.
 #[cfg(unix)]
 fn is_out_of_time(status: ExitStatus) -> bool {
     let signal = std::os::unix::process::ExitStatusExt::signal(&status);
     signal.is_some_and(|signal| OUT_OF_TIME.contains(&signal))
 }
 
-/// Elsewhere its time is not limited.
+/// On other systems its time is not limited.
 #[cfg(not(unix))]
 fn is_out_of_time(_status: ExitStatus) -> bool {
     false
@@ -428,7 +431,7 @@ impl Drop for VideoDecoder {
 }
 
 fn lock(running: &Mutex<Running>) -> std::sync::MutexGuard<'_, Running> {
-    // Nothing panics while it is held.
+    // Nothing panics while the lock is held.
     running.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -438,11 +441,11 @@ fn end(child: &mut Child) {
     let _ = child.wait();
 }
 
-/// The pictures, and the damage, that a program tells which writes and says these bytes; so that fuzzing needs no
-/// program.
+/// The pictures and the damage of a program whose output is `written` and whose standard error is `said`. Fuzzing calls
+/// this, so that it needs no program.
 ///
 /// # Errors
-/// What is written cannot be read.
+/// The output cannot be read.
 #[cfg(fuzzing)]
 pub fn read_output(
     written: &[u8],

@@ -1,6 +1,7 @@
 //! Why a video has no further picture.
 
-/// Most bytes of addresses of a decoder, which needs some ten pictures. Those of 4096 x 2304 pixels fit, not all of 8K.
+/// Most bytes of a decoder's address space, which holds some ten pictures. Pictures of 4096 x 2304 pixels fit, and some
+/// of 8K.
 pub const MAX_MEMORY: u64 = 768 << 20;
 /// Most processor time in seconds.
 pub(super) const MAX_CPU: u64 = 300;
@@ -11,7 +12,7 @@ pub enum VideoError {
     /// The program cannot be started.
     #[error("`{program}` cannot be started: {source}")]
     NoProgram {
-        /// Its name or path.
+        /// The program's name or path.
         program: String,
         /// What the system says.
         source: std::io::Error,
@@ -22,7 +23,7 @@ pub enum VideoError {
     /// The codec is none of those that are read.
     #[error("the video's codec is not read here")]
     UnreadCodec,
-    /// Decoding takes more than it may.
+    /// Decoding takes more of a resource than it may.
     #[error("decoding the video takes more than {0}")]
     TooCostly(Cost),
     /// The video is damaged, or of an unknown kind.
@@ -35,7 +36,7 @@ pub enum VideoError {
     },
 }
 
-/// What decoding may take only so much of.
+/// A resource that decoding may take only so much of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Cost {
     /// The address space of its process.

@@ -1,19 +1,20 @@
 //! Videos to pictures, by an installed `ffmpeg`.
 //!
-//! In: the bytes of a video, or a file. Out: its pictures in order, as JPEG files of high quality with their times,
-//! which then go the way of uploaded frames.
+//! In: the bytes of a video, or a file. Out: its pictures in order, as JPEG files of high quality with their times.
+//! They are then decoded as uploaded frames are.
 //!
 //! A video comes from anywhere, and its decoder is a large program in C. So it runs in a process of its own: it reads
 //! one file or pipe and writes another, knows no other protocol, few formats and few codecs, and its memory, processor
-//! time, files and priority are limited (on Linux). For a file of the person who runs this, all formats and codecs are
-//! known, and memory and processor time are not limited. It ends when its pictures are no longer wanted.
+//! time, files and priority are limited (on Linux). For a file of the person who runs the program, all formats and
+//! codecs are allowed, and memory and processor time are not limited. The process ends when its pictures are no longer
+//! wanted.
 //!
-//! What it says is a fault: from the next picture on nothing is given, since nobody knows which picture of the video
-//! that would be. Before the first picture it may be begun anew, since a video that was cut may begin with pictures
+//! A message of ffmpeg on its standard error is a fault: no further picture is given, since its number in the video
+//! would be unknown. Before the first picture, ffmpeg may be started anew: a video that was cut may begin with pictures
 //! that need others before the cut.
 //!
-//! What can go wrong: there is no `ffmpeg`, it cannot decode the video, or that takes more than it may. Of what it says
-//! the first line is told, which names the cause.
+//! What can go wrong: there is no `ffmpeg`, it cannot decode the video, or that takes more than it may. The error has
+//! the first line of ffmpeg's messages, which names the cause.
 
 mod child;
 mod decoder;

@@ -1,4 +1,4 @@
-//! What ffmpeg writes of a video: for each picture a line of its `framecrc` format, then the picture as a JPEG file.
+//! ffmpeg's output for a video: for each picture a line of the format `framecrc`, then the picture as a JPEG file.
 
 use std::io::{self, BufRead, ErrorKind, Read};
 
@@ -8,7 +8,7 @@ pub(super) const FORMAT: [&str; 3] = [
     "tee",
     "[f=framecrc:flush_packets=1]pipe:1|[f=mjpeg:flush_packets=1]pipe:1",
 ];
-/// The unit of times in it.
+/// The arguments for the unit of times in the output: microseconds.
 pub(super) const TIME_BASE: [&str; 2] = ["-enc_time_base", "1:1000000"];
 const SECOND: f64 = 1e6;
 const MAX_LINE: u64 = 256;
@@ -23,7 +23,7 @@ pub struct VideoPicture {
     pub time: f64,
 }
 
-/// The next picture, of at most `max_bytes` bytes; none at the end.
+/// The next picture, of at most `max_bytes` bytes; `None` at the end.
 pub(super) fn next_picture(
     stream: &mut impl BufRead,
     max_bytes: usize,
@@ -37,7 +37,7 @@ pub(super) fn next_picture(
         if line.is_empty() {
             return Ok(None);
         }
-        // The head says what is in the file.
+        // Lines of the head describe the stream.
         if line.starts_with(b"#") {
             continue;
         }
@@ -52,14 +52,15 @@ pub(super) fn next_picture(
         let mut jpeg = vec![0; length];
         return match stream.read_exact(&mut jpeg) {
             Ok(()) => Ok(Some(VideoPicture { jpeg, time })),
-            // The program was ended.
+            // The program was ended within a picture.
             Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(None),
             Err(error) => Err(error),
         };
     }
 }
 
-/// Of a line: stream, time of decoding, time of showing, duration, bytes, and more.
+/// The time in seconds and the length in bytes of a line, whose fields are: stream, time of decoding, time of showing,
+/// duration, bytes, and more.
 fn time_and_length(line: &[u8]) -> Option<(f64, usize)> {
     let mut fields = str::from_utf8(line).ok()?.split(',').map(str::trim);
     let time: i64 = fields.nth(2)?.parse().ok()?;

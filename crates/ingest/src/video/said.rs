@@ -1,22 +1,22 @@
-//! What the decoder's program says, and the fault that it tells.
+//! The messages of the decoder's program on its standard error, and the fault that they tell.
 
 use std::io::{BufRead, Read, Write};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Most characters that are told of a line.
+/// Most characters of a line that an error repeats.
 const MAX_SAID: usize = 200;
 /// Most bytes of a line that are held; the rest counts as a line of its own.
 const MAX_LINE: u64 = 4096;
 
-/// Comes behind all that the program has said so far, written by whoever waits until that is heard. No text has it.
+/// [`Said::catch_up`] writes this byte behind all messages so far, and waits until it is read. No message contains it.
 const MARK: u8 = 0;
 
 /// What is wrong with a video.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Fault {
-    /// It has no stream of pictures.
+    /// The file has no stream of pictures.
     NoPictures,
-    /// Its codec is not among those that may be read.
+    /// The codec is not among those that may be read.
     UnreadCodec,
     /// There is too little memory.
     Memory,
@@ -24,23 +24,23 @@ pub(super) enum Fault {
     Pixels,
     /// A picture that others are made from is missing.
     Reference,
-    /// Something else: what the program says of it.
+    /// Something else, with the program's message.
     Damage(String),
 }
 
-/// What the program says. Clones hear the same.
+/// What is known from the program's messages. Clones share it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Said(Arc<(Mutex<Heard>, Condvar)>);
 
 #[derive(Debug, Default)]
 struct Heard {
-    /// Whether the program leaves out what it cannot make, in place of ending there.
+    /// Whether the program leaves out pictures that it cannot decode, instead of ending there.
     leaves_out: bool,
-    /// The first one that tells more than that something failed.
+    /// The fault of the first line that says more than that something failed.
     fault: Option<Fault>,
-    /// One that holds for the end of the video alone.
+    /// A fault that counts only at the end of the video.
     fault_at_end: Option<Fault>,
-    /// Whether that is damage, at which the program should end.
+    /// Whether `fault_at_end` is damage, at which the program should end.
     is_damaged: bool,
     /// Whether the last line was of a codec that may not be read.
     is_unlisted: bool,
@@ -49,7 +49,8 @@ struct Heard {
 }
 
 impl Said {
-    /// Nothing yet. The program leaves out pictures that it cannot make for want of others, or ends there.
+    /// No messages yet. `leaves_out`: the program leaves out pictures whose references are missing; otherwise it ends
+    /// there.
     pub(super) fn new(leaves_out: bool) -> Self {
         let heard = Heard {
             leaves_out,
@@ -63,8 +64,8 @@ impl Said {
         self.0.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits until all is heard that the program has said so far, in this pipe. Its pictures come by another one, and
-    /// on a busy machine they are there before what was said earlier.
+    /// Waits until all messages so far in this pipe are read. Pictures come through another pipe, and on a busy machine
+    /// a picture may arrive before earlier messages.
     pub(super) fn catch_up(&self, mut pipe: impl Write) {
         if pipe.write_all(&[MARK, b'\n']).is_ok() {
             drop(pipe);
@@ -81,7 +82,7 @@ impl Said {
         self.0.1.notify_all();
     }
 
-    /// What is wrong with the pictures from here on, once the program has said it.
+    /// What is wrong with the pictures from here on, as far as messages have told it.
     pub(super) fn fault(&self) -> Option<Fault> {
         self.lock().fault.clone()
     }
@@ -97,7 +98,7 @@ impl Said {
         self.lock().is_unlisted
     }
 
-    /// What the program says of damage.
+    /// The message of damage.
     #[cfg(fuzzing)]
     pub(super) fn damage(&self) -> Option<String> {
         match self.fault_in_all() {
@@ -106,7 +107,7 @@ impl Said {
         }
     }
 
-    /// Hears all, so that the program never waits. Whatever it says, little is held.
+    /// Reads all messages, so that the program never blocks. Holds at most some kilobytes of them.
     pub(super) fn hear(&self, mut said: impl BufRead) {
         let mut line = Vec::new();
         while said
@@ -133,8 +134,8 @@ impl Said {
 
 impl Heard {
     fn take(&mut self, line: &str) {
-        // The cache says on every start that it cannot know the length of a pipe. A note of a camera that is no Exif is
-        // passed over by its length.
+        // The cache says on every start that it cannot know the length of a pipe. Decoders skip a camera's note that is
+        // no valid Exif.
         let noise = [
             "Last message repeated",
             "invalid TIFF header in EXIF data",
@@ -144,7 +145,7 @@ impl Heard {
         if is_noise || line.starts_with("[cache @") || line.is_empty() || is_of_sound(line) {
             return;
         }
-        // It is said as soon as the index is looked for. The pictures that are there have their numbers.
+        // ffmpeg says this when it reads the index. The pictures that exist still have right numbers.
         if line.contains("File ended prematurely") {
             self.fault_at_end.get_or_insert_with(|| fault(line, false));
             return;
@@ -159,12 +160,12 @@ impl Heard {
             return;
         }
         match (&self.fault, fault(line, was_unlisted)) {
-            // Memory may be told after what fails for want of it.
+            // The message about memory may come after that of the failure.
             (Some(Fault::Damage(_)), _) if is_memory(line) => self.fault = Some(Fault::Memory),
             (Some(_), _) => {}
-            // It follows from the damage.
+            // This message follows from the damage.
             (None, _) if self.is_damaged && !is_memory(line) => {}
-            // It is looked for ahead of the pictures. Those that are there have their numbers.
+            // ffmpeg finds such damage ahead of the pictures. Pictures before it have right numbers.
             (None, found @ Fault::Damage(_)) if !self.leaves_out && !goes_on_after(line) => {
                 self.fault_at_end = Some(found);
                 self.is_damaged = true;
@@ -174,13 +175,13 @@ impl Heard {
     }
 }
 
-/// Whether the program may go on after such a line, though it is to end at all damage: readers that look for the next
-/// piece that is whole.
+/// Whether the program may go on after such a line although it is to end at all damage: these demuxers look for the
+/// next whole piece.
 fn goes_on_after(line: &str) -> bool {
     line.starts_with("[matroska") || line.starts_with("[gif")
 }
 
-/// Whether a line is of a codec of sound, which is looked at to know what it is, and not decoded.
+/// Whether a line is of a codec of sound, which is probed and not decoded.
 fn is_of_sound(line: &str) -> bool {
     let codec = line
         .strip_prefix('[')
@@ -191,13 +192,13 @@ fn is_of_sound(line: &str) -> bool {
     codec.is_some_and(|(name, _)| codecs.contains(&name.trim_end_matches("float")))
 }
 
-/// Whether a line says that memory cannot be had: that it is not allocated, or the number of the system's error.
+/// Whether a line says that memory cannot be allocated, in words or by the system's error number (ENOMEM, 12).
 fn is_memory(line: &str) -> bool {
     line.contains("allocat") || line.contains("(-12 ")
 }
 
-/// Whether a line says that a picture is missing which others are made from, or what is told before such a picture, as
-/// at the start of a recording that begins between two of them.
+/// Whether a line says that a reference picture is missing, or is one of those that come before the first reference
+/// picture, as at the start of a recording that begins between two of them.
 fn is_reference(line: &str) -> bool {
     let says = [
         // Of H.264 and H.265.
@@ -217,10 +218,10 @@ fn is_reference(line: &str) -> bool {
     says.iter().any(|text| line.contains(text))
 }
 
-/// The fault that a line tells, the first one of all.
+/// The fault that a line tells. `was_unlisted`: the line before named a codec that may not be read.
 fn fault(line: &str, was_unlisted: bool) -> Fault {
     let says = |text: &str| line.contains(text);
-    // Parts of the program name themselves and their addresses before what they say.
+    // Components of ffmpeg put their names and addresses before their messages.
     let mut text = line;
     while text.starts_with('[')
         && let Some((_, rest)) = text.split_once("] ")
@@ -232,10 +233,10 @@ fn fault(line: &str, was_unlisted: bool) -> Fault {
     } else if says("exceeds specified max pixel count") {
         Fault::Pixels
     } else if is_memory(line) || says("get_buffer() failed") {
-        // Without a line before it that says what is wrong with the picture.
+        // Where no earlier line says what is wrong with the picture.
         Fault::Memory
     } else if was_unlisted && says("while opening decoder")
-        // Of a codec that the program does not know at all, in its words of before 6.1 and since.
+        // For a codec that ffmpeg does not know at all: its words before version 6.1, and since.
         || says("not found for input stream")
         || says("no decoder found for")
     {
@@ -256,7 +257,7 @@ mod tests {
     use std::io::{self, BufReader};
     use std::thread;
 
-    /// The whole line was held: as many bytes as the program has time for.
+    /// If a whole line were held, it could take as many bytes as the program has time to write.
     #[test]
     fn of_a_line_without_an_end_little_is_held() {
         let said = Said::default();
@@ -267,7 +268,7 @@ mod tests {
         assert_eq!(said.fault_in_all(), told);
     }
 
-    /// On a busy machine a first picture was there before what had been said of the pictures before it.
+    /// On a busy machine a first picture may arrive before messages about pictures before it.
     #[test]
     fn what_was_said_is_heard_before_a_picture_is_given() {
         let (reference, sound) = (
@@ -276,7 +277,7 @@ mod tests {
         );
         for (before, after, expected) in [
             (reference, "", Some(Fault::Reference)),
-            // The program is within a line.
+            // The mark comes within a line of the program.
             (&sound[..12], &sound[12..], None),
         ] {
             let said = Said::default();
@@ -340,14 +341,14 @@ mod tests {
         assert_eq!(fault(&[unlisted, failed]), Some(Fault::UnreadCodec));
         let unknown = "Decoder (codec none) not found for input stream #0:0";
         assert_eq!(fault(&[unknown]), Some(Fault::UnreadCodec));
-        // The sound's codec may not be read either, and says nothing of the pictures.
+        // The unread codec may be that of the sound, which says nothing about the pictures.
         assert_eq!(
             fault(&[unlisted, "[h264 @ 0x1] no extradata", failed]),
             damage("no extradata")
         );
     }
 
-    /// What is found ahead of the pictures counts where the program ends, if it does.
+    /// Damage that is found ahead of the pictures counts only where the program ends.
     #[test]
     fn damage_counts_at_the_end_where_the_program_ends_at_it() {
         let nal = "[h264 @ 0x1] Invalid NAL unit size (9 > 5).";

@@ -11,12 +11,12 @@ pub enum VideoFormat {
     MotionJpeg,
 }
 
-/// What the first box of an MP4 or QuickTime file may be. Older cameras write no `ftyp`.
+/// The types that the first box of an MP4 or QuickTime file may have. Older cameras write no `ftyp`.
 const BOXES: [&[u8; 4]; 7] = [
     b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"pnot",
 ];
 
-/// The format of bytes that came with this media type; none where they are no video.
+/// The format of bytes that came with this media type; `None` where they are no video.
 pub fn video_format(bytes: &[u8], media_type: &str) -> Option<VideoFormat> {
     let is_boxed = bytes
         .get(4..8)
@@ -37,7 +37,7 @@ pub fn video_format(bytes: &[u8], media_type: &str) -> Option<VideoFormat> {
 mod tests {
     use super::*;
 
-    /// It was taken for an MP4 file.
+    /// Its first box must not make it count as an MP4 file.
     #[test]
     fn a_jpeg_whose_first_segment_spells_ftyp_is_a_picture() {
         let jpeg = b"\xFF\xD8\xFF\xE0ftyp";

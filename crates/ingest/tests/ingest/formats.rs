@@ -8,7 +8,7 @@ use bagtrack_tracker::Frame;
 use image::{DynamicImage, ImageFormat};
 use jpeg_encoder::ColorType;
 
-// Small enough that the working image is the picture itself; no multiple of a block.
+// Small enough that the working image is the picture itself; no side is a multiple of a block.
 const SIZE: (u32, u32) = (101, 75);
 
 fn frame(bytes: &[u8]) -> Frame {
@@ -180,7 +180,7 @@ fn cmyk_jpegs_give_luma_too() {
         let mut decoded = 0;
         for (name, form) in jpeg_forms() {
             let bytes = jpeg_of(&cmyk, SIZE, kind, form, None);
-            // Refused is fine, wrong is not.
+            // A file may be refused, but not decoded wrongly.
             if let Ok(frame) = decode(&bytes, &Limits::default()) {
                 let (_, mean) = difference(&frame, &gray(SIZE.0, SIZE.1));
                 assert!(mean < 3.0, "{kind:?} {name}: off by {mean} on average");

@@ -56,8 +56,8 @@ fn a_file_cut_anywhere_is_an_error() {
 
 #[test]
 fn a_jpeg_cut_in_its_data_and_closed_with_an_end_marker_is_an_error() {
-    // Some cameras and proxies close what they cut.
-    // zune-jpeg 0.5.15 by itself makes gray blocks of what lacks, in strict mode too.
+    // Some cameras and proxies close what they cut. zune-jpeg 0.5.15 by itself fills in gray blocks for the missing
+    // data, in strict mode too.
     let picture = color(160, 480);
     for scans in [None, Some(5)] {
         let bytes = jpeg(&picture, JpegForm { scans, ..BASELINE }, None);
@@ -232,7 +232,7 @@ fn a_picture_without_height_or_width_is_a_typed_error() {
         for side in sides {
             let mut none = file.clone();
             none[side.clone()].fill(0);
-            // One of a JPEG once went on to the tracker's arithmetic, and panicked there.
+            // A side of 0 that passes here would panic in the tracker's arithmetic.
             let result = inspect(&none, &SMALL).map(|file| file.size());
             assert!(
                 matches!(result, Err(IngestError::Damaged { .. })),
@@ -243,7 +243,7 @@ fn a_picture_without_height_or_width_is_a_typed_error() {
     }
 }
 
-/// It counted as a picture of 0 by 0 pixels, and the tracker's arithmetic panicked on that.
+/// If it counted as a picture of 0 by 0 pixels, the tracker's arithmetic would panic.
 #[test]
 fn a_png_without_its_header_is_a_typed_error() {
     let image: DynamicImage = color(32, 32).into();
@@ -257,7 +257,7 @@ fn a_png_without_its_header_is_a_typed_error() {
     );
 }
 
-/// Its decoder tells a side of 0 pixels, and the tracker's arithmetic panicked on that.
+/// Its decoder gives a side of 0 pixels, on which the tracker's arithmetic would panic.
 #[test]
 fn a_webp_of_the_longest_sides_is_a_typed_error() {
     let image: DynamicImage = color(32, 32).into();
@@ -298,7 +298,7 @@ fn write_empty_pixels(bits: &mut Bits) {
     (0..4).for_each(|_| bits.write_single_code());
 }
 
-/// Two such files of 3 KB held all workers for ever.
+/// Without a check of the sizes, a file of 3 KB would hold a worker for ever.
 #[test]
 fn a_webp_is_answered_soon_whatever_size_its_chunks_claim() {
     let image = encode(&color(64, 48).into(), ImageFormat::WebP).split_off(12);
@@ -356,7 +356,7 @@ fn mutated() -> impl Strategy<Value = Vec<u8>> {
         })
 }
 
-/// Whatever it is, the answer is an error or a frame within the limits.
+/// Whatever the bytes are, the result is an error or a frame within the limits.
 fn check(bytes: &[u8]) {
     if let Ok(frame) = decode(bytes, &SMALL) {
         let (width, height) = frame.source_size();

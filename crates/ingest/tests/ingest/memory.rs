@@ -22,7 +22,7 @@ fn encode(image: DynamicImage, format: ImageFormat) -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// Adds a colour profile that unpacks to so many MiB.
+/// Adds a colour profile that unpacks to `mib` MiB.
 fn with_profile(mut png: Vec<u8>, mib: usize) -> Vec<u8> {
     let mut data = ZlibEncoder::new(b"iCCPprofile\0\0".to_vec(), Compression::fast());
     for _ in 0..mib {
@@ -36,7 +36,7 @@ fn with_profile(mut png: Vec<u8>, mib: usize) -> Vec<u8> {
     png
 }
 
-/// A PNG with a palette, whose pixels are all the first colour; interlaced in seven passes where that is asked for.
+/// A PNG with a palette, whose pixels all have the first colour; `interlaced` in seven passes.
 fn with_palette(side: usize, interlaced: bool) -> Vec<u8> {
     let chunk = |name: &[u8; 4], data: &[u8]| {
         let named = [name.as_slice(), data].concat();
@@ -115,7 +115,7 @@ impl Bits {
     }
 }
 
-/// A lossless WebP of 1024 x 1024 equal pixels with so many groups of codes, each with 2048 codes of 11 bits.
+/// A lossless WebP of 1024 x 1024 equal pixels with `groups` groups of codes, each with 2048 codes of 11 bits.
 pub fn with_code_groups(groups: usize) -> Vec<u8> {
     let mut bits = Bits::default();
     bits.write(0x2f, 8);
@@ -170,14 +170,14 @@ pub fn canvas(is_animation: bool) -> Vec<u8> {
     webp_chunk(b"VP8X", &[flags, 0, 0, 0, 0xff, 3, 0, 0xff, 3, 0])
 }
 
-/// The first frame of an animation, with sides of so many pixels.
+/// The first frame of an animation, with sides of `side` pixels.
 pub fn animation_frame(side: u32, chunks: &[Vec<u8>]) -> Vec<u8> {
     let side = &(side - 1).to_le_bytes()[..3];
     let header = [&[0; 6], side, side, &[40, 0, 0, 0]].concat();
     webp_chunk(b"ANMF", &[header, chunks.concat()].concat())
 }
 
-/// A lossy image of which there is no more than its header, with sides of 16,383 pixels.
+/// A lossy image with sides of 16,383 pixels that has a header and no data.
 fn endless_lossy() -> Vec<u8> {
     let header = [0x10, 0, 0, 0x9d, 1, 0x2a, 0xff, 0x3f, 0xff, 0x3f];
     webp_chunk(b"VP8 ", &[&header[..], &[0; 1000]].concat())
@@ -208,7 +208,7 @@ fn no_format_allocates_more_than_is_promised() {
     };
     let cmyk = |side: u32, form| {
         let samples = vec![99; 4 * (side * side) as usize];
-        // Decoders do not take other ones.
+        // The decoders do not take other samplings.
         let form = JpegForm {
             sampling: SamplingFactor::R_4_4_4,
             ..form

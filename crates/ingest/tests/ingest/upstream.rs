@@ -1,5 +1,5 @@
-//! Faults of the decoders by themselves, which ingest guards against. When a test fails the fault was mended: then the
-//! document in `docs/upstream` says which guard can go.
+//! Faults of the decoders by themselves, which ingest guards against. If a test fails, the fault is mended: the
+//! document in `docs/upstream` then says which guard can go.
 
 use crate::memory::with_code_groups;
 use bagtrack_testing::picture_files::{BASELINE, JpegForm, color, jpeg};
