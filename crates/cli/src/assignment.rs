@@ -3,11 +3,11 @@
 use bagtrack_tracker::{Params, ParamsError};
 use serde_json::Value;
 
-/// A parameter cannot be set as told.
+/// Why an assignment is refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AssignError {
-    /// It is not `NAME=VALUE`.
+    /// The text is not `NAME=VALUE`.
     #[error("{0:?}: it must be NAME=VALUE")]
     Form(String),
     /// There is no parameter of this name.
@@ -15,7 +15,7 @@ pub enum AssignError {
     Name {
         /// The name given.
         name: String,
-        /// Those there are.
+        /// The names of all parameters.
         names: String,
     },
     /// The value is not of the parameter's type.
@@ -28,7 +28,7 @@ pub enum AssignError {
         /// What is wrong with it.
         reason: String,
     },
-    /// The parameters are of the right types, but out of their ranges.
+    /// The values have the right types, but some are out of their ranges.
     #[error(transparent)]
     Range(#[from] ParamsError),
 }
@@ -50,7 +50,7 @@ pub fn parse_assignment(text: &str) -> Result<Assignment, AssignError> {
 /// `base` with single parameters set, all in their ranges.
 ///
 /// # Errors
-/// The first assignment that is wrong, or the ranges in the end.
+/// The first assignment that is wrong, or a value out of its range after all assignments.
 pub fn assign(base: &Params, assignments: &[Assignment]) -> Result<Params, AssignError> {
     let mut params = base.clone();
     for (name, value) in assignments {

@@ -18,11 +18,12 @@ pub fn read_boxes(dir: &Path) -> Result<Vec<Option<Rect>>, SequenceError> {
     parse_boxes(&text).map_err(|reason| SequenceError::new(dir, format!("{BOXES}: {reason}")))
 }
 
-/// Reads OTB boxes, `x,y,width,height` a line, separated by commas, tabs or spaces: 1-based in the text, 0-based in
-/// the answer. A box without size (`0,0,0,0`) or with a NaN in it means that the frame is not annotated.
+/// Reads OTB boxes, `x,y,width,height` a line, separated by commas, tabs or spaces: coordinates are 1-based in the
+/// text, 0-based in the result. A box without size (`0,0,0,0`) or with a NaN in it means that the frame is not
+/// annotated.
 ///
 /// # Errors
-/// Says which line is not four numbers.
+/// A line is not four numbers; the text says which.
 pub fn parse_boxes(text: &str) -> Result<Vec<Option<Rect>>, String> {
     text.trim_end()
         .lines()

@@ -30,7 +30,7 @@ pub fn list(dir: &Path) -> Result<Vec<PathBuf>, SequenceError> {
     Ok(frames)
 }
 
-/// Images of other kinds beside the frames of [`list`], which are not read.
+/// Images of types that are not read, in the folder of the frames of [`list`].
 ///
 /// # Errors
 /// The folder cannot be read.
@@ -48,7 +48,7 @@ fn files(dir: &Path, endings: &[&str]) -> Result<Vec<PathBuf>, SequenceError> {
     let mut frames = Vec::new();
     for entry in fs::read_dir(&pictures).map_err(unreadable)? {
         let entry = entry.map_err(unreadable)?;
-        // macOS writes a file ._NAME beside NAME to disks of others.
+        // macOS writes a file ._NAME beside NAME on foreign file systems.
         if entry.file_name().to_string_lossy().starts_with('.') {
             continue;
         }
@@ -86,7 +86,7 @@ fn natural(a: &str, b: &str) -> Ordering {
     a_rest.len().cmp(&b_rest.len()).then(a.cmp(b))
 }
 
-/// Takes the digits at the start of `text`, and gives them without leading zeros.
+/// Takes the digits from the start of `text`, and returns them without leading zeros.
 fn number<'a>(text: &mut &'a str) -> &'a str {
     let end = text
         .find(|c: char| !c.is_ascii_digit())

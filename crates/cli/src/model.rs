@@ -21,10 +21,10 @@ pub struct ModelFlag {
 }
 
 impl ModelFlag {
-    /// The network; none without the flag.
+    /// The network; `None` without the flag.
     ///
     /// # Errors
-    /// A file that cannot be read, or is no such network, as a line of text that names the file.
+    /// A file cannot be read, or is no such network; the text is one line and names the file.
     pub fn load(&self) -> Result<Option<Arc<dyn Expert>>, String> {
         let load = |files: &ModelFiles| files.load(self.model_in_doubt);
         self.model.as_ref().map(load).transpose()
@@ -61,10 +61,10 @@ impl FromStr for ModelFiles {
 }
 
 impl ModelFiles {
-    /// The network in these files, to be asked of every frame, or only of those of which the filter is not sure.
+    /// The network in these files. With `in_doubt` it is asked only of frames of which the filter is not sure.
     ///
     /// # Errors
-    /// A file that cannot be read, or is no such network, as a line of text that names the file.
+    /// A file cannot be read, or is no such network; the text is one line and names the file.
     pub fn load(&self, in_doubt: bool) -> Result<Arc<dyn Expert>, String> {
         let read = |path: &PathBuf| {
             fs::read(path).map_err(|error| format!("--model: {}: {error}", path.display()))

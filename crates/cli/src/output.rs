@@ -6,7 +6,7 @@ use std::fs;
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::path::Path;
 
-/// Makes `dir`, or takes it if it is empty. Existing files are never overwritten.
+/// Makes the folder `dir`, or takes an existing one if it is empty, so that no file is overwritten.
 pub fn new_folder(dir: &Path) -> Result<(), String> {
     fs::create_dir_all(dir).map_err(|error| format!("{}: {error}", dir.display()))?;
     let mut entries = fs::read_dir(dir).map_err(|error| format!("{}: {error}", dir.display()))?;

@@ -1,7 +1,7 @@
 //! Tracker parameters from the command line.
 //!
-//! `--set` takes every field of [`Params`], so that measurements can switch off what a preset owns; `--help` lists
-//! those of the table.
+//! `--set` takes every field of [`Params`], so that measurements can switch off the parts of a preset; `--help` lists
+//! the parameters of the table.
 
 use crate::assignment::{AssignError, Assignment, assign, parse_assignment};
 use bagtrack_tracker::{Parameter, Params, Preset};
@@ -20,10 +20,10 @@ pub struct ParamFlags {
 }
 
 impl ParamFlags {
-    /// The preset's parameters with the single ones set, all in their ranges.
+    /// The preset's parameters with the assignments applied, all in their ranges.
     ///
     /// # Errors
-    /// What is wrong with an assignment, as a line of text.
+    /// An assignment is wrong, or a value is out of its range; the text is one line.
     pub fn params(&self) -> Result<Params, String> {
         let params = assign(&self.preset.params(), &self.assignments);
         params.map_err(|error| match error {
@@ -32,7 +32,7 @@ impl ParamFlags {
         })
     }
 
-    /// What these parameters are called: the preset, and what is set.
+    /// A label for these parameters: the preset's name, and the assignments.
     pub fn label(&self) -> String {
         let preset = match self.preset {
             Preset::Paper => "paper",
