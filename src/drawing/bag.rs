@@ -16,7 +16,7 @@ pub struct ContactSheet {
 }
 
 impl ContactSheet {
-    /// That of these entries.
+    /// The contact sheet of these entries.
     pub fn of(bag: &[BagEntry]) -> Self {
         Self {
             rows: bag.iter().map(tiles).collect(),
@@ -36,16 +36,16 @@ impl ContactSheet {
         (GAP + across * step_x, GAP + self.rows.len() as u32 * step_y)
     }
 
-    /// Bytes of the sheet's pixels. Its file takes no more, but for a little.
+    /// Bytes of the sheet's pixels. The PNG file takes hardly more.
     pub fn bytes(&self) -> usize {
         let (width, height) = self.size();
         3 * width as usize * height as usize
     }
 
-    /// As a PNG file.
+    /// The sheet as a PNG file.
     ///
     /// # Errors
-    /// It cannot be encoded.
+    /// The sheet cannot be encoded.
     pub fn png(&self) -> ImageResult<Vec<u8>> {
         let (width, height) = self.size();
         let (step_x, step_y) = self.step();
@@ -77,7 +77,8 @@ fn tiles(entry: &BagEntry) -> Vec<RgbImage> {
     tiles
 }
 
-/// One value a cell as gray, from the least to the greatest; 0 is in the middle where there are values on both sides.
+/// One square of gray for each value, from the least to the greatest, tinted by the chroma where there is any. With
+/// negative values, 0 is medium gray.
 fn tile(vector: &VectorView, values: &[f32], chroma: Option<&[Vec<f32>; 2]>) -> RgbImage {
     let least = values.iter().copied().fold(f32::INFINITY, f32::min);
     let most = values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
@@ -96,7 +97,7 @@ fn tile(vector: &VectorView, values: &[f32], chroma: Option<&[Vec<f32>; 2]>) -> 
             Some([blue, red]) => [blue[cell], red[cell]].map(|value| 60.0 * value / most_chroma),
             None => [0.0; 2],
         };
-        // Full-range BT.601.
+        // YCbCr to RGB by BT.601 in full range.
         let color = [
             gray + 1.402 * red,
             gray - 0.344 * blue - 0.714 * red,

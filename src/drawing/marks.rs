@@ -7,13 +7,13 @@ use image::{Rgb, RgbImage};
 
 /// The colour of particles.
 const PARTICLE: Rgb<u8> = Rgb([255, 240, 60]);
-/// What particles of the least and of the greatest weight cover of the picture.
+/// How opaque particles of the least and of the greatest weight are, from 0 to 1.
 const COVER: [f64; 2] = [0.25, 0.9];
 
 /// What is drawn of one target.
 #[derive(Debug, Clone, Copy)]
 pub struct Drawn<'a> {
-    /// Its number, where there are several.
+    /// The target's number, where there are several.
     pub number: Option<usize>,
     /// The answer.
     pub estimate: &'a Estimate,
@@ -73,7 +73,7 @@ fn text_of(target: &Drawn) -> String {
     }
 }
 
-/// A square of `side` pixels, of which `cover` in [0, 1] is seen.
+/// Draws a square of `side` pixels with the opacity `cover`, in [0, 1].
 fn dot(image: &mut RgbImage, (x, y): (f64, f64), side: u32, cover: f64) {
     let half = f64::from(side) / 2.0;
     for y in span(y - half, y + half, image.height()) {
@@ -87,7 +87,7 @@ fn dot(image: &mut RgbImage, (x, y): (f64, f64), side: u32, cover: f64) {
     }
 }
 
-/// The whole pixels from `from` to `to` that are within `limit`.
+/// The pixels from `from` to `to`, both rounded, that are below `limit`.
 fn span(from: f64, to: f64, limit: u32) -> std::ops::Range<u32> {
     let clamp = |edge: f64| edge.round().clamp(0.0, f64::from(limit)) as u32;
     clamp(from)..clamp(to)
@@ -112,8 +112,8 @@ fn outline(image: &mut RgbImage, target: &Rect, thickness: f64, color: Rgb<u8>) 
     }
 }
 
-/// Writes a text above the box, or below it where there is no room above, on ground of this colour. Where there is room
-/// for it nowhere, some of it is left out.
+/// Writes a text above the box, or below it where there is no room above, on a background of this colour. What does not
+/// fit into the picture is left out.
 fn write(image: &mut RgbImage, text: &str, target: &Rect, size: u32, color: Rgb<u8>) {
     let margin = size;
     let width = text.len() as u32 * WIDTH * size + 2 * margin;

@@ -14,7 +14,7 @@ pub struct Picture {
     pub(super) image: RgbImage,
     /// Pixels of the picture for each pixel of the uploaded frame, across and down.
     pub(super) scale: (f64, f64),
-    /// The shape of the file's pixels, across and down, where it is a JPEG file: those of many videos are no squares.
+    /// The aspect ratio of a JPEG file's pixels, across and down: the pixels of many videos are no squares.
     density: Option<PixelDensity>,
 }
 
@@ -52,7 +52,7 @@ impl Picture {
             }
             let chroma = |plane| f32::from(at(plane, x / 2, y / 2, chroma_width)) - 128.0;
             let (gray, blue, red) = (f32::from(gray), chroma(&cb), chroma(&cr));
-            // Full-range BT.601.
+            // YCbCr to RGB by BT.601 in full range.
             let color = [
                 gray + 1.402 * red,
                 gray - 0.344_136 * blue - 0.714_136 * red,
@@ -75,7 +75,7 @@ impl Picture {
         self.image.as_raw().len()
     }
 
-    /// As a PNG file.
+    /// The picture as a PNG file.
     ///
     /// # Errors
     /// The picture cannot be encoded.
@@ -85,7 +85,7 @@ impl Picture {
         Ok(bytes.into_inner())
     }
 
-    /// As a JPEG file.
+    /// The picture as a JPEG file.
     ///
     /// # Errors
     /// The picture has more than 65,535 pixels on a side.
@@ -100,10 +100,10 @@ impl Picture {
     }
 }
 
-/// The density of a JPEG file's pixels, from its JFIF header: without its unit, their shape.
+/// The aspect ratio of a JPEG file's pixels: the densities in its JFIF header, without their unit.
 fn density(jpeg: &[u8]) -> Option<PixelDensity> {
     let jfif = jpeg.strip_prefix(&[0xff, 0xd8, 0xff, 0xe0])?.get(2..)?;
-    // After the version and the unit.
+    // The densities follow the version and the unit.
     let sides = jfif.strip_prefix(b"JFIF\0")?.get(3..7)?;
     let side = |at: usize| u16::from_be_bytes([sides[at], sides[at + 1]]);
     let density = (side(0), side(2));
