@@ -13,7 +13,7 @@ pub struct Addresses {
 }
 
 impl Addresses {
-    /// Those of a service that listens on `listen`, by this scheme, below this path.
+    /// The addresses of a service that listens on `listen`, with this scheme and base path.
     pub fn of(scheme: &str, listen: SocketAddr, base_path: &BasePath) -> Self {
         let address = |ip: IpAddr| url(scheme, SocketAddr::new(ip, listen.port()), base_path);
         let ip = listen.ip();
@@ -36,7 +36,7 @@ fn url(scheme: &str, address: SocketAddr, base_path: &BasePath) -> String {
     format!("{scheme}://{address}{base_path}")
 }
 
-/// The loopback address of the same kind.
+/// The loopback address of the same version of IP.
 pub fn loopback(ip: IpAddr) -> IpAddr {
     match ip {
         IpAddr::V4(_) => Ipv4Addr::LOCALHOST.into(),
@@ -44,7 +44,7 @@ pub fn loopback(ip: IpAddr) -> IpAddr {
     }
 }
 
-/// The address of this machine in its network: what it would send from. Nothing is sent.
+/// The address of this machine in its network: the one that it would send from. Nothing is sent.
 fn network_address() -> Option<IpAddr> {
     let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).ok()?;
     // An address for documentation (RFC 5737), which is beyond the network's router.

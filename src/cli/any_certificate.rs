@@ -1,5 +1,4 @@
-//! TLS to a service whose certificate is not checked: for the health check, which asks at this machine's own address
-//! and sends nothing that is secret.
+//! TLS to a service whose certificate is not checked: for the health check, which sends nothing secret.
 
 use rustls::client::danger::{HandshakeSignatureValid, ServerCertVerified, ServerCertVerifier};
 use rustls::crypto::{CryptoProvider, ring, verify_tls12_signature, verify_tls13_signature};
@@ -10,7 +9,7 @@ use rustls::{
 use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
 
-/// The stream to the service at this address, once its handshake is made.
+/// Makes a TLS handshake over `stream` with the service at this address.
 ///
 /// # Errors
 /// The service does not speak TLS.
@@ -32,7 +31,7 @@ pub fn connect(
     Ok(StreamOwned::new(connection, stream))
 }
 
-/// Takes any certificate, as long as the service has its key.
+/// Accepts any certificate, as long as the service proves that it has the private key.
 #[derive(Debug)]
 struct AnyCertificate(Arc<CryptoProvider>);
 

@@ -1,9 +1,9 @@
-//! `bagtrack confined PROGRAM …`: gives up rights, then becomes the program. `serve` starts ffmpeg so.
+//! `bagtrack confined PROGRAM …`: gives up rights, then becomes the program. `serve` starts ffmpeg in this way.
 //!
 //! Landlock leaves it the system's programs and libraries to read, and nothing to write; a filter of system calls
-//! leaves it no sockets, and no way to look into other processes. What it works on comes as its standard input. Both
-//! hold for all that it starts, and cannot be taken back. Where the system lacks one of them it runs with the other
-//! alone, or with none, which `serve` tells at its start.
+//! leaves it no sockets, and no way to look into other processes. The program's data comes through its standard input.
+//! Both restrictions also hold for all processes that it starts, and cannot be taken back. Where the system lacks one
+//! or both, the program runs without; `serve` warns of that at its start.
 
 use std::error::Error;
 use std::ffi::OsString;
@@ -40,14 +40,14 @@ pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
     use std::os::unix::process::CommandExt;
     let (program, arguments) = args.command.split_first().ok_or("no program")?;
     let path = found(Path::new(program));
-    // Where this cannot be had, `serve` has told so at its start.
+    // Where the restrictions fail, `serve` has warned at its start.
     let _ = restrict(path.as_deref().and_then(Path::parent));
-    // It returns only where the program cannot be started.
+    // `exec` returns only where the program cannot be started.
     let _failed = Command::new(program).args(arguments).exec();
     Ok(ExitCode::from(NOT_STARTED))
 }
 
-/// Elsewhere nothing is given up.
+/// On other systems no rights are given up.
 #[cfg(not(target_os = "linux"))]
 pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
     let (program, arguments) = args.command.split_first().ok_or("no program")?;
@@ -66,20 +66,20 @@ fn found(program: &Path) -> Option<PathBuf> {
     files.find_map(|file| file.canonicalize().ok())
 }
 
-/// Whether both restrictions work here. They are tried in a thread, which is the only one that they hold for.
+/// Whether both restrictions work here. They are tried in a thread, and hold for that thread alone.
 #[cfg(target_os = "linux")]
 pub fn works() -> bool {
     let tried = std::thread::spawn(|| restrict(None).is_ok());
     tried.join().unwrap_or(false)
 }
 
-/// Elsewhere there are none.
+/// Other systems have no such restrictions.
 #[cfg(not(target_os = "linux"))]
 pub fn works() -> bool {
     false
 }
 
-/// Gives up what a decoder does not need, on this thread. `folder` may be read too.
+/// Gives up the rights that a decoder does not need, for this thread. `folder` may be read too.
 #[cfg(target_os = "linux")]
 fn restrict(folder: Option<&Path>) -> Result<(), Box<dyn Error>> {
     let files = restrict_files(folder);

@@ -1,8 +1,8 @@
 //! Exports the spans of requests with OpenTelemetry, in its own protocol (OTLP) over HTTP.
 //!
 //! The usual variables say where to and how: `OTEL_EXPORTER_OTLP_ENDPOINT` (without it nothing is exported),
-//! `OTEL_SERVICE_NAME`, `OTEL_TRACES_SAMPLER` and so on. A thread of its own sends the spans in batches. When the
-//! collector does not answer they are dropped, and no request waits for it.
+//! `OTEL_SERVICE_NAME`, `OTEL_TRACES_SAMPLER` and so on. A thread of its own sends the spans in batches. Spans are
+//! dropped while the collector does not answer; no request waits for it.
 
 use opentelemetry::trace::TracerProvider;
 use opentelemetry_sdk::Resource;
@@ -25,7 +25,7 @@ const LAST_SPANS: Duration = Duration::from_secs(2);
 pub struct Export(SdkTracerProvider);
 
 impl Export {
-    /// Begins to export, if a variable says where to.
+    /// Begins to export; `None` if no variable says where to.
     ///
     /// # Errors
     /// The variables cannot be used.
@@ -50,7 +50,7 @@ impl Export {
         Ok(Some(Self(provider.build())))
     }
 
-    /// What hands the spans over.
+    /// The layer that hands spans to the export.
     pub fn layer<S>(&self) -> OpenTelemetryLayer<S, SdkTracer>
     where
         S: Subscriber + for<'span> LookupSpan<'span>,

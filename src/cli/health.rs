@@ -69,7 +69,7 @@ pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// An address to connect to: a service that listens on all addresses is on the local one.
+/// An address to connect to: loopback for a service that listens on all addresses.
 fn reachable(mut listen: SocketAddr) -> SocketAddr {
     if listen.ip().is_unspecified() {
         listen.set_ip(loopback(listen.ip()));
@@ -115,7 +115,7 @@ fn status_over(mut stream: impl Read + Write, host: &str) -> Result<String, Box<
         "GET /healthz HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n"
     )?;
     let mut answer = Vec::new();
-    // A service that ends a connection of TLS may leave the goodbye out.
+    // A service may end a TLS connection without `close_notify`, which is an error after the answer.
     let read = stream.take(MAX_ANSWER).read_to_end(&mut answer);
     if answer.is_empty() {
         read?;

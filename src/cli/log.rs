@@ -1,6 +1,6 @@
 //! Where the log of `serve` goes: to standard error, by a thread of its own.
 //!
-//! What can go wrong: whoever reads standard error stalls. Nothing that logs ever waits for it: up to [`MAX_LINES`]
+//! What can go wrong: the reader of standard error stalls. No thread that logs ever waits for it: up to [`MAX_LINES`]
 //! lines are kept, further ones are dropped and counted, and the log tells how many as soon as it is read again.
 
 use std::backtrace::{Backtrace, BacktraceStatus};
@@ -32,7 +32,7 @@ pub enum LogFormat {
 /// The log. Lines that wait are written when it is dropped, if that takes no longer than a second.
 #[derive(Debug)]
 pub struct Log {
-    /// Dropped before the writer: it may have something to tell.
+    /// Dropped before the writer, since the export may still log.
     #[cfg(feature = "otel")]
     _export: Option<super::export::Export>,
     _writer: WorkerGuard,
@@ -50,7 +50,7 @@ impl Log {
     /// Sends all events that `filter` lets through, and all panics, to standard error.
     ///
     /// # Errors
-    /// The filter cannot be read, or the variables of the export.
+    /// The filter or the variables of the export cannot be read.
     pub fn start(filter: &str, format: LogFormat) -> Result<Self, String> {
         let filter = read_filter(filter)?;
         let stderr = BufWriter::with_capacity(BUFFER_BYTES, io::stderr());
@@ -70,10 +70,10 @@ impl Log {
         let events = events.with(export.as_ref().map(super::export::Export::layer));
         match format {
             LogFormat::Text => events.with(log).init(),
-            // The span of the request is there once, not again in a list of all spans.
+            // The current span is enough: a list of all spans would repeat it.
             LogFormat::Json => events.with(log.json().with_span_list(false)).init(),
         }
-        // The default hook writes to standard error itself, and would wait for its reader.
+        // The default hook writes to standard error itself, and would wait for the reader.
         std::panic::set_hook(Box::new(log_panic));
         Ok(Self {
             #[cfg(feature = "otel")]
@@ -83,7 +83,7 @@ impl Log {
         })
     }
 
-    /// What tells how many lines were dropped.
+    /// The counter of dropped lines, which reports them.
     pub fn dropped(&self) -> DroppedLines {
         self.dropped.clone()
     }
@@ -91,7 +91,7 @@ impl Log {
 
 impl DroppedLines {
     /// Logs how many lines were dropped, if that is more than at the last time. Where this line is dropped too, the
-    /// next one tells it.
+    /// next report counts it.
     pub fn report(&mut self) {
         let total = self.counter.dropped_lines();
         if total > self.told {
@@ -115,12 +115,12 @@ impl DroppedLines {
     }
 }
 
-/// Libraries that log each attempt to reach what is away, hundreds a second. The service says when it goes and comes
-/// back. The database of a store in a folder tells each step of being opened.
+/// Levels of chatty libraries. The client of Redis logs each attempt to connect, hundreds a second; the service itself
+/// logs when the store goes away and comes back. The database of a store in a folder logs each step of being opened.
 const QUIET: &str = "redis=off,fjall=warn,lsm_tree=warn";
 
-/// The filter of this text. A word alone must be a level: a mistyped one would be a module that logs nothing, and all
-/// others would log nothing either.
+/// The filter of this text. A word alone must be a level: a mistyped level would count as the name of a module, and
+/// then nothing would be logged.
 fn read_filter(text: &str) -> Result<EnvFilter, String> {
     let words = text.split(',').map(str::trim);
     let mut words = words.filter(|word| !word.is_empty() && !word.contains(['=', '[']));

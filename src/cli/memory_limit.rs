@@ -1,13 +1,13 @@
-//! The system's limits of memory against what the service says that it takes at most.
+//! Compares the system's limits of memory with the service's own bound.
 
 use std::fs;
 use std::path::Path;
 
-/// Where Linux tells of control groups.
+/// Where Linux mounts control groups.
 const GROUPS: &str = "/sys/fs/cgroup";
 
-/// Says that the service may be ended for want of memory, where a limit lies below its own bound of so many bytes. Then
-/// all sessions would be lost.
+/// Warns where a limit of the system lies below `bound`, in bytes, the most memory that the service takes. The system
+/// may then end the service, and all sessions would be lost.
 pub fn check(bound: u64) {
     for (name, limit) in [
         (
@@ -63,7 +63,7 @@ fn control_group() -> Option<u64> {
             _ => return None,
         };
         let group = Path::new(&root).join(path.trim_start_matches('/'));
-        // In a container the path may be that outside of it.
+        // In a container the path may be the one outside of the container.
         let groups = group
             .ancestors()
             .take_while(|group| group.starts_with(&root));

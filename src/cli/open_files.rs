@@ -1,13 +1,13 @@
-//! The system's limit of open files against what the settings need.
+//! Fits the number of connections to the system's limit of open files.
 
 use bagtrack::http::Config;
 use bagtrack_config::PROBE_CONNECTIONS;
 
-/// Files that are open beside connections: the log, the listener, the runtime's own.
+/// Files that are open besides connections: the log, the listener, the runtime's own.
 const OTHERS: usize = 64 + PROBE_CONNECTIONS;
 
 /// Raises the soft limit of open files as far as `config` needs and the hard limit allows. Where that is not enough,
-/// lowers the number of connections, and says so: without it, new connections would wait unanswered.
+/// lowers the number of connections, and logs a warning: otherwise new connections would wait unanswered.
 pub fn fit(config: &mut Config) {
     let needed = config.max_connections.saturating_add(OTHERS);
     let have = raise(needed);

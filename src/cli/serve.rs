@@ -1,7 +1,7 @@
 //! `bagtrack serve`: the HTTP service until SIGTERM or SIGINT.
 //!
-//! It ends with status 0 when all open requests have ended in time, and with 1 when some were cut off, or when a second
-//! signal ended it at once.
+//! The exit status is 0 when all open requests have ended in time, and 1 when some were cut off, or when a second
+//! signal ended the service at once.
 
 use super::address::Addresses;
 use super::confined;
@@ -51,8 +51,8 @@ pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
     result
 }
 
-/// Files that the process makes are for its own user alone: states of sessions have parts of the pictures in them, and
-/// the folder of a store may be one that others look into.
+/// Files that the process makes are for its own user alone: states of sessions contain parts of the pictures, and other
+/// users may be able to read the folder of a store.
 #[cfg(unix)]
 fn own_new_files() {
     use rustix::fs::Mode;
@@ -77,7 +77,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     }
     let (no_auth, listen) = (config.access.no_auth, config.listen);
     let (base_path, ffmpeg) = (config.base_path.clone(), config.limits.ffmpeg.clone());
-    // The start may wait for a store, and whoever sends the signal does not know of that.
+    // The start may wait for a store. A SIGHUP that comes meanwhile must not end the process.
     let hangups = Hangups::listen()?;
     let application = Application::bind(config).await?;
     let reloaded = Reloaded::of(&application);
@@ -121,7 +121,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// Warns where videos will be refused.
+/// Warns where videos will be refused, since ffmpeg cannot be started.
 fn check_ffmpeg(program: &str) {
     if program == OFF {
         return;
@@ -141,7 +141,7 @@ fn check_ffmpeg(program: &str) {
     }
 }
 
-/// Has ffmpeg started by this program, which gives up its rights before.
+/// Lets ffmpeg be started through this program, which gives up rights first.
 fn confine_decoders(config: &mut Config) {
     let hides_files = confined::works();
     match own_program() {
@@ -158,7 +158,7 @@ fn confine_decoders(config: &mut Config) {
     }
 }
 
-/// This program, also where another one has taken its place on the disk meanwhile, as after an upgrade.
+/// The file of this running program, even where an upgrade has replaced it on the disk.
 fn own_program() -> io::Result<PathBuf> {
     let running = PathBuf::from("/proc/self/exe");
     match running.exists() {

@@ -10,7 +10,7 @@ use std::io;
 use std::sync::Arc;
 use tokio::sync::watch;
 
-/// The signals to end that have come so far. Clones see the same ones.
+/// The signals to end that have come so far. Clones share them.
 #[derive(Clone)]
 pub struct Signals(watch::Receiver<Vec<Shutdown>>);
 
@@ -18,7 +18,7 @@ impl Signals {
     /// Begins to listen.
     ///
     /// # Errors
-    /// What the system says.
+    /// The system refuses to register the signal.
     pub fn listen() -> io::Result<Self> {
         let (came, seen) = watch::channel(Vec::new());
         let mut source = Source::new()?;
@@ -49,7 +49,7 @@ impl Signals {
     }
 }
 
-/// What is read again on a SIGHUP.
+/// The keys and the certificate, which are read again on a SIGHUP.
 #[derive(Clone)]
 pub struct Reloaded {
     keys: ApiKeys,
@@ -70,7 +70,7 @@ impl Reloaded {
         }
     }
 
-    /// Each of them stays as it was where it cannot be read.
+    /// Reads all of them again. One that cannot be read stays as it was.
     #[cfg(unix)]
     fn reload(&self) {
         match self.keys.reload() {
@@ -94,7 +94,7 @@ impl Reloaded {
     }
 }
 
-/// The SIGHUPs that come. Without it they end the process.
+/// Receives SIGHUPs. Before [`Hangups::listen`], a SIGHUP ends the process.
 #[cfg(unix)]
 pub struct Hangups(tokio::signal::unix::Signal);
 
@@ -103,17 +103,17 @@ impl Hangups {
     /// Begins to listen.
     ///
     /// # Errors
-    /// What the system says.
+    /// The system refuses to register the signal.
     pub fn listen() -> io::Result<Self> {
         use tokio::signal::unix::{SignalKind, signal};
         signal(SignalKind::hangup()).map(Self)
     }
 }
 
-/// Has a write above the limit of a file's size (`ulimit -f`) fail, in place of ending the process.
+/// Makes a write above the limit of a file's size (`ulimit -f`) fail, instead of ending the process.
 ///
 /// # Errors
-/// What the system says.
+/// The system refuses to register the signal.
 #[cfg(unix)]
 pub fn outlive_file_limit() -> io::Result<()> {
     let seen = Arc::default();

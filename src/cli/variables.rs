@@ -1,4 +1,4 @@
-//! Variables of the environment that set nothing: empty ones, and those that are named like settings and are none.
+//! Variables of the environment that set nothing: empty ones, and those whose names look like settings but are none.
 
 use clap::{Arg, Command};
 
@@ -10,8 +10,8 @@ const OF_KUBERNETES: [&str; 2] = ["_SERVICE_", "_PORT"];
 /// The heading of the settings that say who may use the service.
 const ACCESS: &str = "Access and keys";
 
-/// The command, which takes empty variables as not set: charts and compose files pass those that nobody gave. Those of
-/// access stay, and are refused: a key that was lost on its way must not open the service.
+/// The command, which takes empty variables as not set, since charts and compose files pass settings that nobody gave
+/// as empty. Empty variables of access are refused instead: a key that was lost on its way must not open the service.
 pub fn without_empty(command: Command) -> Command {
     let without = |arg: Arg| match is_left_out(&arg) {
         true => arg.env(None::<&str>),

@@ -24,12 +24,12 @@ pub enum Destination {
 pub enum Drawn {
     /// Pictures in a folder.
     Folder(PathBuf),
-    /// A video, and when its first frame is shown in the source, where frames have times.
+    /// A video, and the time of its first frame in the source, in seconds, where frames have times.
     Video(VideoFile, Option<f64>),
 }
 
 impl Destination {
-    /// What `out` names: a new folder if it has no ending, or a slash at its end; or a new video.
+    /// The destination that `out` names: a new folder if `out` has no ending, or a slash at its end; else a new video.
     pub fn of(out: &Path) -> Result<Self, String> {
         let shown = out.display();
         let has_slash = out.to_string_lossy().ends_with(std::path::is_separator);
@@ -57,8 +57,7 @@ impl Destination {
         }
     }
 
-    /// Begins to write frames of which `first` is the first: at their own times, or, where they have none, so many a
-    /// second.
+    /// Begins to write frames, the first of which is `first`: at their own times or, where they have none, at `rate`.
     pub fn open(&self, rate: Rate, first: &FrameFile) -> Result<Drawn, Box<dyn Error>> {
         match self {
             Self::Folder(folder) => Ok(Drawn::Folder(folder.clone())),
@@ -82,14 +81,14 @@ impl Drawn {
                 let name = name.unwrap_or_else(|| format!("{:06}.jpg", frame.index));
                 let mut file = folder.join(Path::new(&name).with_extension("jpg"));
                 if file.exists() {
-                    // Of a.jpg and a.png.
+                    // The source has two files that differ only in their endings, like a.jpg and a.png.
                     file = folder.join(format!("{name}.jpg"));
                 }
                 fs::write(&file, picture)
                     .map_err(|error| format!("{}: {error}", file.display()))?;
             }
             Self::Video(video, first) => {
-                // Backwards, times go down.
+                // When tracking goes backwards, times decrease.
                 let seconds = frame.time.zip(*first);
                 let seconds = seconds.map_or(0.0, |(time, first)| (time - first).abs());
                 video.add(&picture, seconds)?;

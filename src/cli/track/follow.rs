@@ -13,26 +13,26 @@ use std::error::Error;
 use std::io::{self, ErrorKind};
 use std::sync::Arc;
 
-/// What there is to do.
+/// The parts of one run of `track`.
 pub struct Job {
     pub frames: Frames,
     /// The targets in the first frame that is wanted.
     pub boxes: Vec<Rect>,
     pub params: Params,
-    /// What gives a second opinion, where it is wanted.
+    /// The network for a second opinion, where one is wanted.
     pub expert: Option<Arc<dyn Expert>>,
     /// Where drawn frames go, if they are wanted.
     pub destination: Option<Destination>,
-    /// How many frames are tracked after the first one, at most.
+    /// Most frames that are tracked after the first one.
     pub count: Option<u64>,
     /// Which boxes are written.
     pub selection: Selection<Row>,
     pub rows: Rows,
-    /// What the video or folder is called.
+    /// The name of the video or folder.
     pub name: String,
-    /// What each target is called.
+    /// The names of the targets.
     pub names: Vec<String>,
-    /// Goes on by a step a frame.
+    /// The progress bar, which takes a step for each frame.
     pub bar: ProgressBar,
 }
 
@@ -48,13 +48,13 @@ impl Job {
     pub fn run(mut self, interrupt: &Interrupt) -> Result<u64, Box<dyn Error>> {
         let (mut targets, mut drawn) = (None, None);
         let followed = self.follow(interrupt, &mut targets, &mut drawn);
-        // Also after an error: the frames before it are worth keeping.
+        // Written even after an error: the frames before it are worth keeping.
         write(&mut self.rows, self.selection.finish())?;
         if let Some(targets) = targets {
             self.finish(&targets)?;
         }
         let finished = drawn.map_or(Ok(()), Drawn::finish);
-        // An encoder that has ended is the cause of an error in the loop.
+        // If the encoder has ended, its error is the cause of the one in the loop, so it is returned first.
         finished?;
         followed
     }
@@ -150,7 +150,7 @@ impl Job {
     }
 }
 
-/// Writes rows, to a reader that may have seen enough: `bagtrack track … | head`.
+/// Writes rows. Stops without an error where the reader has closed the pipe, as in `bagtrack track … | head`.
 fn write(to: &mut Rows, rows: Vec<Row>) -> io::Result<Then> {
     if rows.is_empty() {
         return Ok(Then::GoOn);
@@ -158,7 +158,7 @@ fn write(to: &mut Rows, rows: Vec<Row>) -> io::Result<Then> {
     or_stop(to.write(rows))
 }
 
-/// A reader that has seen enough is no error.
+/// Turns a closed pipe into `Then::Stop`: a reader that has seen enough is no error.
 fn or_stop(written: io::Result<()>) -> io::Result<Then> {
     match written {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(Then::Stop),

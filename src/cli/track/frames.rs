@@ -1,4 +1,4 @@
-//! The frames of `bagtrack track`: those of a folder, or of a video, forwards or backwards.
+//! The frames of `bagtrack track`, from a folder or a video, forwards or backwards.
 
 use super::reversed::Reversed;
 use super::start::Start;
@@ -17,14 +17,14 @@ pub struct FrameFile {
     pub index: u64,
     /// Seconds since the first frame of the video.
     pub time: Option<f64>,
-    /// What messages call it.
+    /// Its name in messages.
     pub shown: String,
-    /// The name of its file, where it has one.
+    /// The name of its file; `None` for a frame of a video.
     pub file: Option<String>,
     pub bytes: Vec<u8>,
 }
 
-/// Which way frames are taken.
+/// In which direction of time frames are tracked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
     Forwards,
@@ -35,16 +35,16 @@ pub enum Direction {
 pub struct Frames {
     source: Source,
     direction: Direction,
-    /// What messages call the folder or the video.
+    /// The name of the folder or the video in messages.
     shown: String,
-    /// The number of the next frame; none after number 0 of those that go backwards.
+    /// The number of the next frame; `None` after frame 0 on the way backwards.
     next: Option<u64>,
     /// The number of the first frame that is wanted.
     first: u64,
 }
 
 enum Source {
-    /// Those that are wanted, and how many there are.
+    /// The files that are still to be tracked, and how many the folder has.
     Folder(IntoIter<PathBuf>, u64),
     Video(Pictures, VideoInfo),
 }
@@ -104,7 +104,7 @@ impl Frames {
         })
     }
 
-    /// Frames before the start are passed over where the file has no index.
+    /// Opens a video. Where the file has no index, frames before the start are decoded and passed over.
     fn of_video(path: &Path, start: Start, direction: Direction) -> Result<Self, Box<dyn Error>> {
         let shown = path.display().to_string();
         check_is_video(path)?;
@@ -166,7 +166,7 @@ impl Frames {
         }
     }
 
-    /// Whether there is a frame after so many.
+    /// Whether there is a frame after `length` frames.
     pub fn go_on_after(&mut self, length: u64) -> bool {
         match self.count() {
             Some(count) => length < count,
@@ -204,7 +204,7 @@ impl Frames {
         }
     }
 
-    /// The next frame; none after the last.
+    /// The next frame; `None` after the last.
     pub fn next(&mut self) -> Result<Option<FrameFile>, Box<dyn Error>> {
         let Some(index) = self.next else {
             return Ok(None);
@@ -255,7 +255,7 @@ fn too_short(shown: &str, count: u64) -> String {
     format!("{shown}: --start is after its last frame: it has {count} frames, counted from 0")
 }
 
-/// Standard input, or an address, as ffmpeg takes them.
+/// Whether the path is standard input or a URL, which ffmpeg would take, but `track` does not.
 fn is_no_path(path: &Path) -> bool {
     path == Path::new("-") || path.to_string_lossy().contains("://")
 }
@@ -278,7 +278,7 @@ fn read(index: u64, path: &Path) -> Result<FrameFile, String> {
     })
 }
 
-/// Tells photos, archives and texts, of which ffmpeg would say that they are damaged videos.
+/// Refuses photos, archives and texts by name: ffmpeg would call them damaged videos.
 fn check_is_video(path: &Path) -> Result<(), Box<dyn Error>> {
     let mut start = Vec::new();
     let file = fs::File::open(path);

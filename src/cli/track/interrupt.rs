@@ -16,13 +16,13 @@ impl Interrupt {
     /// Begins to listen. A second signal ends the process at once.
     ///
     /// # Errors
-    /// What the system says.
+    /// The system refuses to register a signal.
     pub fn listen() -> io::Result<Self> {
         let came = Arc::new(AtomicUsize::new(0));
         let is_second = Arc::new(AtomicBool::new(false));
         let hangup = (!is_ignored(SIGHUP)).then_some(SIGHUP);
         for signal in [SIGINT, SIGTERM].into_iter().chain(hangup) {
-            // They act in this order.
+            // The handlers run in this order: the first signal sets the flag that makes the second one end the process.
             flag::register_conditional_default(signal, is_second.clone())?;
             flag::register(signal, is_second.clone())?;
             flag::register_usize(signal, came.clone(), signal.unsigned_abs() as usize)?;
@@ -44,8 +44,8 @@ impl Interrupt {
     }
 }
 
-/// Whether whoever started the program has it ignore a signal, as `nohup` does with SIGHUP. Where the system does not
-/// tell, it does not.
+/// Whether the program was started with this signal ignored, as `nohup` does with SIGHUP; false where the system does
+/// not tell.
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

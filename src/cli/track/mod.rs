@@ -3,8 +3,9 @@
 //! In: frames, and a box for each target in the first of them. Out: a row for each target in each frame, and the frames
 //! with the boxes drawn on them.
 //!
-//! What can go wrong: a path that cannot be read or written is told before the first row. A frame that cannot be read,
-//! or a signal, ends the command; the rows and the drawn frames before it are kept, and the video gets its end.
+//! What can go wrong: a path cannot be read or written, which is an error before the first row. A frame that cannot be
+//! read, or a signal, ends the command; the rows and the drawn frames before it are kept, and the drawn video is
+//! finished.
 
 mod drawn;
 mod follow;
@@ -113,7 +114,7 @@ pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
     };
     let rows = Rows::open(args.output.as_deref(), format, columns)?;
     let bar = match rows.are_on_terminal() {
-        // The rows tell how far it is, and a bar would be among them.
+        // The rows on the terminal show the progress, and a bar would be written among them.
         true => indicatif::ProgressBar::hidden(),
         false => output::bar_or_count(left(&frames, args.frames), "frames"),
     };
@@ -139,13 +140,13 @@ pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
     Ok(interrupt.exit_code())
 }
 
-/// How many frames are taken, where that is known.
+/// How many frames will be tracked, the first included, where that is known.
 fn left(frames: &Frames, most: Option<u64>) -> Option<u64> {
     let wanted = most.map(|most| most.saturating_add(1));
     frames.left().into_iter().chain(wanted).min()
 }
 
-/// How boxes are written, and what else can be told before any file is opened.
+/// The format of the boxes. Checks all flags that can be checked before a file is opened.
 fn check(args: &Args) -> Result<Format, String> {
     let count = args.boxes.len();
     if count > MAX_TARGETS {
@@ -169,7 +170,7 @@ fn check(args: &Args) -> Result<Format, String> {
     Ok(format)
 }
 
-/// What the ending of the output's name says of its format.
+/// The format that the ending of the output's name tells.
 fn format_of(output: Option<&Path>) -> Result<Format, String> {
     let ending = output.and_then(Path::extension).and_then(OsStr::to_str);
     Ok(Format::File(match ending {
@@ -184,19 +185,19 @@ fn format_of(output: Option<&Path>) -> Result<Format, String> {
     }))
 }
 
-/// The name of a file or folder, whatever way led to it.
+/// The name of a file or folder itself, without the path to it and links.
 fn name_of(path: &Path) -> String {
     let whole = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let name = whole.file_name().unwrap_or(whole.as_os_str());
     name.to_string_lossy().into_owned()
 }
 
-/// What a target is called, as the service takes it.
+/// Reads the name of a target, by the rules of the service.
 fn target_name(text: &str) -> Result<String, String> {
     Name::try_from(text.to_owned()).map(|name| name.0)
 }
 
-/// What each of `count` targets is called.
+/// The names of `count` targets.
 fn names_of(given: &[String], count: usize) -> Result<Vec<String>, String> {
     if given.len() > count {
         return Err(format!(

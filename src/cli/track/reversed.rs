@@ -5,7 +5,7 @@ use bagtrack_ingest::video::{VideoDecoder, VideoLimits};
 use std::error::Error;
 use std::path::PathBuf;
 
-/// So many pictures are decoded forwards and kept, as JPEG files, to be given backwards.
+/// Pictures that are decoded forwards in one run, and kept as JPEG files to be returned backwards.
 const RUN: u64 = 64;
 
 /// A video that is read backwards, run by run.
@@ -14,7 +14,7 @@ pub struct Reversed {
     limits: VideoLimits,
     /// The pictures before this one are not decoded yet.
     end: u64,
-    /// The pictures from `end` on that are still to be given; the next one is the last.
+    /// The decoded pictures from `end` on that are still to be returned, the last one first.
     run: Vec<Vec<u8>>,
 }
 
@@ -29,7 +29,8 @@ impl Reversed {
         }
     }
 
-    /// The picture before the last one; none after number 0, or where the video has too few pictures.
+    /// The picture before the one that was returned last; `None` after number 0, or where the video has too few
+    /// pictures.
     pub fn next_picture(&mut self, info: &VideoInfo) -> Result<Option<Vec<u8>>, Box<dyn Error>> {
         if self.run.is_empty() && self.end > 0 {
             self.decode_run(info)?;
@@ -37,7 +38,7 @@ impl Reversed {
         Ok(self.run.pop())
     }
 
-    /// Decodes the run before `end`: in a file without an index, from the file's beginning.
+    /// Decodes the run before `end`. A file without an index is decoded from its beginning.
     fn decode_run(&mut self, info: &VideoInfo) -> Result<(), Box<dyn Error>> {
         let begin = self.end.saturating_sub(RUN);
         let (first, from) = info.seek_to(begin).unzip();
@@ -50,7 +51,7 @@ impl Reversed {
     }
 }
 
-/// So many pictures after those that are passed over; none where there are fewer.
+/// The `count` pictures after the first `passed_over`; empty where there are fewer.
 fn pictures(
     mut decoder: VideoDecoder,
     passed_over: u64,

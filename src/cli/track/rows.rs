@@ -6,8 +6,8 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-/// Takes the rows. Lines are written at once, so that they are kept whatever ends the process; a document or a folder
-/// is written by `finish`.
+/// Takes the rows. Formats of lines are written at once, so that the lines are kept whatever ends the process. A
+/// document or a folder is written by `finish`.
 pub struct Rows {
     sink: Sink,
     is_on_terminal: bool,
@@ -27,13 +27,13 @@ enum Sink {
 /// A file, or standard output.
 struct Output {
     out: Box<dyn Write>,
-    /// The file, if it was made for what is written.
+    /// The path of the file, if this program made it.
     made: Option<PathBuf>,
     has_begun: bool,
 }
 
 impl Rows {
-    /// Rows in this format, to standard output or to a file or folder, which must be new.
+    /// Opens standard output for rows in this format, or a file or folder at `path`, which must be new.
     pub fn open(path: Option<&Path>, format: Format, columns: Columns) -> Result<Self, String> {
         let path = path.filter(|path| *path != Path::new("-"));
         let sink = match format {
@@ -56,7 +56,7 @@ impl Rows {
         })
     }
 
-    /// Whether people see the lines as they come.
+    /// Whether rows go to a terminal, line by line.
     pub fn are_on_terminal(&self) -> bool {
         self.is_on_terminal
     }
@@ -84,7 +84,7 @@ impl Rows {
         }
     }
 
-    /// How many frames the rows reach over, where they were kept.
+    /// How many frames the kept rows span; 0 for formats of lines, which keep none.
     pub fn length(&self) -> u64 {
         match &self.sink {
             Sink::Lines(..) => 0,
@@ -92,7 +92,7 @@ impl Rows {
         }
     }
 
-    /// Writes what was kept until now. The rows are those of this clip.
+    /// Writes the kept rows, which are those of this clip.
     pub fn finish(&mut self, clip: &Clip) -> io::Result<()> {
         match &mut self.sink {
             Sink::Lines(..) => Ok(()),
@@ -133,7 +133,7 @@ impl Output {
 }
 
 impl Drop for Output {
-    /// Takes away a file that nothing was written to, so that the command can be given again.
+    /// Removes a file that nothing was written to, so that the command can be repeated.
     fn drop(&mut self) {
         if let (Some(path), false) = (&self.made, self.has_begun) {
             let _ = fs::remove_file(path);
@@ -141,7 +141,8 @@ impl Drop for Output {
     }
 }
 
-/// Opens a file that is not there, or one that is no usual file, like /dev/null or a pipe; and whether it was made.
+/// Makes a new file, or opens an existing one that is not a regular file, like /dev/null or a pipe. Returns whether the
+/// file was made.
 fn create(path: &Path) -> Result<(File, bool), String> {
     let named = |error: io::Error| match error.kind() {
         ErrorKind::AlreadyExists => {

@@ -5,7 +5,7 @@
 pub enum Start {
     /// By its number, from 0.
     Frame(u64),
-    /// By its time: the first frame that is not before so many seconds.
+    /// By its time: the first frame that is not before this many seconds.
     Time(f64),
 }
 
@@ -15,7 +15,7 @@ const USAGE: &str =
 /// Reads `120`, `12.5s`, `1:30`, `0:01:30.5`.
 ///
 /// # Errors
-/// It is none of these.
+/// The text has none of these forms.
 pub fn parse(text: &str) -> Result<Start, String> {
     if let Ok(frame) = text.parse() {
         return Ok(Start::Frame(frame));
@@ -28,7 +28,7 @@ pub fn parse(text: &str) -> Result<Start, String> {
     seconds.map(Start::Time).ok_or_else(|| USAGE.to_owned())
 }
 
-/// Minutes and seconds, or hours, minutes and seconds; all but the first below 60.
+/// The seconds of `minutes:seconds` or `hours:minutes:seconds`, in which all parts but the first are below 60.
 fn clock(text: &str) -> Option<f64> {
     let mut parts = text.split(':');
     let first: u32 = parts.next()?.parse().ok()?;

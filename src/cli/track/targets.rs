@@ -12,8 +12,8 @@ pub struct Targets {
 }
 
 impl Targets {
-    /// Trackers that start with `boxes` in a frame. They are those of a session of the service with these boxes.
-    /// `expert` gives a second opinion of each, where there is one.
+    /// Trackers that start with `boxes` in a frame. They are the same as in a session of the service with these boxes.
+    /// `expert`, where given, gives each a second opinion.
     pub fn start(
         bytes: &[u8],
         boxes: &[Rect],
@@ -48,12 +48,12 @@ impl Targets {
         Ok(())
     }
 
-    /// Width and height of the frames, as the boxes count them.
+    /// Width and height of the frames, in the pixels of the boxes.
     pub fn frame_size(&self) -> (u32, u32) {
         self.frame_size
     }
 
-    /// The last answer for each.
+    /// The last answer for each target.
     pub fn estimates(&self) -> Vec<Estimate> {
         self.trackers.iter().map(Tracker::estimate).collect()
     }

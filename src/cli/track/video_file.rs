@@ -1,4 +1,4 @@
-//! A video that is written frame by frame, by an installed ffmpeg. It gets JPEG pictures with their times as an IVF
+//! A video that is written frame by frame, by an installed ffmpeg. ffmpeg gets JPEG pictures with their times as an IVF
 //! file: a header of 32 bytes, and before each picture its length and its time.
 
 use super::video_info::{FFMPEG, Rate};
@@ -8,17 +8,17 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread::{self, JoinHandle};
 
-/// What a name may end with to be a video.
+/// The endings of names of videos.
 const ENDINGS: [&str; 7] = ["mp4", "m4v", "mov", "mkv", "webm", "avi", "gif"];
 /// The usual encoders want even sides.
 const EVEN: &str = "pad=ceil(iw/2)*2:ceil(ih/2)*2";
-/// A GIF has 256 colours a frame: those that the frame needs.
+/// ffmpeg's filter that chooses the 256 colours of each frame of a GIF.
 const PALETTE: &str = "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1";
 
-/// Ticks of a frame's own time, a second: those of MPEG, of which usual frames take a whole number.
+/// Ticks a second of frames' own times: MPEG's, of which frames at usual rates take a whole number.
 const TICKS: u32 = 90_000;
 
-/// Players show a picture of a GIF for longer where it has less than two hundredths of a second: ticks.
+/// Least time of a picture of a GIF, in ticks: players show one with less than two hundredths of a second for longer.
 const LEAST_OF_GIF: u64 = TICKS as u64 / 50;
 
 /// When the pictures of a video are shown.
@@ -26,7 +26,7 @@ const LEAST_OF_GIF: u64 = TICKS as u64 / 50;
 pub enum Timing {
     /// Each at its own time.
     Own,
-    /// So many a second.
+    /// All at equal intervals, at this rate.
     Equal(Rate),
 }
 
@@ -55,11 +55,11 @@ fn ending(path: &Path) -> String {
 }
 
 impl VideoFile {
-    /// A new video of JPEG pictures like this one. It is tried first whether this ffmpeg can write such a video there.
-    /// Pictures of an AVI are equally long.
+    /// A new video of JPEG pictures like this one. First a trial tells whether this ffmpeg can write such a video
+    /// there. Pictures of an AVI are shown equally long.
     ///
     /// # Errors
-    /// It cannot.
+    /// ffmpeg cannot be started, or cannot write such a video there.
     pub fn create(
         path: &Path,
         rate: Rate,
@@ -72,7 +72,7 @@ impl VideoFile {
         };
         let mut trial = Self::start(path, timing)?;
         let added = trial.add(picture, 0.0);
-        // It tells why nothing could be added, too.
+        // `finish` also tells why nothing could be added.
         let finished = trial.finish();
         let _ = fs::remove_file(path);
         finished.and(added)?;
@@ -89,11 +89,11 @@ impl VideoFile {
         }
         match ending(path).as_str() {
             "gif" => command.args(["-vf", PALETTE]),
-            // Its usual encoder aims at 200 kbit/s otherwise.
+            // Without a quality, the default encoder of AVI aims at 200 kbit/s.
             "avi" => command.args(["-vf", EVEN, "-pix_fmt", "yuv420p", "-q:v", "3"]),
             _ => command.args(["-vf", EVEN, "-pix_fmt", "yuv420p"]),
         };
-        // With the folder, it cannot be taken for a flag or a URL.
+        // An absolute path cannot be taken for a flag or a URL.
         let absolute = std::path::absolute(path);
         command.arg(absolute.map_err(|error| format!("{}: {error}", path.display()))?);
         command
@@ -125,12 +125,12 @@ impl VideoFile {
             encoder,
             said,
         };
-        // An encoder that has ended already is told with the first picture.
+        // If the encoder has ended already, adding the first picture fails.
         let _ = video.write(&header(timing));
         Ok(video)
     }
 
-    /// Adds a picture, a JPEG file, which is shown so many seconds after the first one.
+    /// Adds a picture, a JPEG file, which is shown `seconds` after the first one.
     ///
     /// # Errors
     /// The encoder has ended; [`Self::finish`] tells why.
@@ -161,7 +161,7 @@ impl VideoFile {
     /// Waits until all is written.
     ///
     /// # Errors
-    /// It could not be; the text has what the encoder said last.
+    /// The video could not be written; the text has the encoder's last message.
     pub fn finish(mut self) -> Result<(), String> {
         drop(self.encoder.stdin.take());
         let ended = self.encoder.wait();

@@ -11,10 +11,10 @@ pub const FFMPEG: &str = "ffmpeg";
 const FFPROBE: &str = "ffprobe";
 /// The first names of formats whose files have an index.
 const INDEXED: [&str; 2] = ["mov", "matroska"];
-/// Frames whose times are not further apart, in seconds, are shown at once, as in a recording that notes when they
-/// came.
+/// Frames whose times differ by no more than this, in seconds, count as shown at once. Recordings that note the times
+/// of arrival have such frames.
 const AT_ONCE: f64 = 1e-4;
-/// Encoders of MPEG-4 take no larger parts of a fraction.
+/// The greatest numerator and denominator of a rate that encoders of MPEG-4 take.
 const MAX_PART: u32 = 65535;
 
 /// Frames a second, as a fraction.
@@ -29,14 +29,15 @@ pub struct Rate {
 pub struct VideoInfo {
     /// Frames a second, on average.
     pub rate: Rate,
-    /// When each frame is shown, in seconds; empty where that is not known of all.
+    /// When each frame is shown, in seconds; empty unless it is known for all.
     times: Vec<f64>,
-    /// The start time of a file with an index, in which ffmpeg finds any frame.
+    /// The start time, in seconds, of a file with an index, in which ffmpeg can seek to any frame; `None` for other
+    /// files.
     indexed_from: Option<f64>,
 }
 
 impl Default for Rate {
-    /// The rate where nothing tells.
+    /// The rate of frames without times: 25 a second.
     fn default() -> Self {
         Self {
             numerator: 25,
@@ -46,8 +47,8 @@ impl Default for Rate {
 }
 
 impl Rate {
-    /// Reads a fraction as ffprobe writes it. One with large parts, as the average of a phone's video is, becomes one
-    /// of thousandths.
+    /// Reads a fraction as ffprobe writes it. A fraction with large parts, like the average rate of a phone's video, is
+    /// rounded to thousandths.
     fn parse(text: &str) -> Option<Self> {
         let (numerator, denominator) = text.split_once('/')?;
         let [numerator, denominator] = [numerator.parse().ok()?, denominator.parse().ok()?];
@@ -69,7 +70,7 @@ impl Rate {
         })
     }
 
-    /// So many frames in so many seconds.
+    /// The numerator and the denominator.
     pub fn parts(self) -> (u32, u32) {
         (self.numerator, self.denominator)
     }
@@ -99,13 +100,14 @@ impl VideoInfo {
         let is_vp8 = told.lines().any(|line| line.starts_with("stream,vp8,"));
         match are_frames(&packets) && !is_vp8 {
             true => Ok(info),
-            // They have to be decoded.
+            // The frames have to be decoded to know their times.
             false => Ok(Self::parse(&ask(path, "frame=pts")?).0),
         }
     }
 
     /// Reads lines like `packet,512,K__` or `frame,512`, `stream,h264,25/1,1/12800` and `format,"mov,mp4",0.000000`.
-    /// Gives the times in the order of the lines, too: from whole ticks, since ffprobe cuts seconds to microseconds.
+    /// Returns the times in the order of the lines, too. They are computed from whole ticks, since ffprobe truncates
+    /// seconds to microseconds.
     fn parse(told: &str) -> (Self, Vec<Option<f64>>) {
         let fields = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
         let mut ticks = Vec::new();
@@ -144,10 +146,11 @@ impl VideoInfo {
         (info, told_times)
     }
 
-    /// From which frame on the file is to be decoded for frame `index`, and within which seconds after its start time
-    /// that one is found: between the frames beside it, and nearer to itself, since ffmpeg rounds to what the file
-    /// counts in. It is the first of those that are shown at once with `index`: ffmpeg tells frames apart by their
-    /// times. None where the file has to be decoded from its beginning.
+    /// Where to seek for frame `index`: the number of the frame at which decoding begins, and the range of seconds
+    /// after the file's start time in which that frame is shown. It is the first of the frames that are shown at once
+    /// with `index`, since ffmpeg tells frames apart by their times. The range ends between this frame and its
+    /// neighbours, nearer to this frame, since ffmpeg rounds to the file's ticks. `None` where the file has to be
+    /// decoded from its beginning.
     pub fn seek_to(&self, index: u64) -> Option<(u64, Range<f64>)> {
         let of_index = self.times.get(usize::try_from(index).ok()?)?;
         let first = self
@@ -178,7 +181,7 @@ impl VideoInfo {
     /// The first frame that is not before this time.
     pub fn frame_at(&self, seconds: f64) -> u64 {
         match self.times.first() {
-            // As many as there are: one that does not exist, where all are before it.
+            // Where all frames are before the time, this is the number of frames, which no frame has.
             Some(first) => {
                 self.times
                     .partition_point(|time| time - first < seconds - 1e-6) as u64
@@ -188,7 +191,7 @@ impl VideoInfo {
     }
 }
 
-/// What ffprobe says of the video at `path`, and of each of its packets or frames.
+/// ffprobe's output for the video at `path`; `each` names the fields of each packet or frame.
 fn ask(path: &Path, each: &str) -> io::Result<String> {
     let mut command = Command::new(FFPROBE);
     command.args(["-v", "error", "-select_streams", "V:0", "-of", "csv"]);
@@ -198,9 +201,8 @@ fn ask(path: &Path, each: &str) -> io::Result<String> {
     Ok(String::from_utf8_lossy(&command.output()?.stdout).into_owned())
 }
 
-/// Whether packets with these times are the frames that are shown. Where a video was cut, the first packets may be of
-/// pictures before the first one, which cannot be made, and some may have no time. Where none has one, frames have
-/// none.
+/// Whether packets with these times are the frames that are shown. Where a video was cut, its first packets may be of
+/// pictures that cannot be decoded, and some may have no time. Where no packet has a time, frames have none either.
 fn are_frames(times: &[Option<f64>]) -> bool {
     let Some(Some(first)) = times.first() else {
         return times.iter().all(Option::is_none);
@@ -216,7 +218,7 @@ mod tests {
 
     #[test]
     fn times_are_in_the_order_of_showing_and_count_from_the_first() {
-        // B-frames come before the frames that they are shown after; the first packet is cut off by an edit list.
+        // Packets are not in the order of showing, because of B-frames. An edit list cuts off the first packet.
         let told =
             "packet,9,KD_\npacket,10,K__\npacket,12,___\npacket,11,___\nstream,h264,10/1,1/10\n";
         let (info, packets) = VideoInfo::parse(told);
@@ -230,7 +232,7 @@ mod tests {
         assert_eq!((at(0.0), at(0.1), at(0.11), at(0.3)), (0, 1, 2, 3));
     }
 
-    /// Thirtieths of a second, of which ffprobe tells 0.066667 and 2.133333.
+    /// In thirtieths of a second; ffprobe gives 0.066667 and 2.133333 for these times.
     #[test]
     fn times_after_a_first_one_that_is_not_0_are_rounded_once() {
         let (info, _) = VideoInfo::parse("packet,2,K__\npacket,64,___\nstream,h264,30/1,1/30\n");
