@@ -7,7 +7,7 @@ use std::str::FromStr;
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct BasePath(String);
 
-/// A text is no base path.
+/// The text is no base path.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("a base path is like /tracker or /video/tracker: letters, digits, and -._~")]
 pub struct BasePathError;
@@ -18,7 +18,7 @@ impl BasePath {
         &self.0
     }
 
-    /// The rest of a path below this one.
+    /// The rest of `path` below this one; `None` where `path` is not below it.
     pub fn below<'a>(&self, path: &'a str) -> Option<&'a str> {
         let rest = path.strip_prefix(&self.0)?;
         (rest.is_empty() || rest.starts_with('/')).then_some(rest)

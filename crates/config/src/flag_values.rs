@@ -15,7 +15,7 @@ pub(super) fn parse_whole<N: FromStr>(text: &str) -> Result<N, String> {
 /// Reads a duration: `10m`, `30s`, `500ms`, or a number of seconds alone.
 ///
 /// # Errors
-/// It is none of these.
+/// The text has none of these forms.
 pub fn parse_duration(text: &str) -> Result<Duration, humantime::DurationError> {
     match text.parse() {
         Ok(seconds) => Ok(Duration::from_secs(seconds)),
@@ -27,7 +27,7 @@ pub fn parse_duration(text: &str) -> Result<Duration, humantime::DurationError> 
 /// a name the first one of IPv4 counts.
 ///
 /// # Errors
-/// It has no port, or the name no address.
+/// The text has no port, or its name has no address.
 pub fn parse_listen(text: &str) -> Result<SocketAddr, String> {
     let usage = "an address with a port, like 127.0.0.1:8080 or localhost:8080";
     let found = text

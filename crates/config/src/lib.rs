@@ -1,6 +1,6 @@
 //! The settings of the service, with their defaults and ranges.
 //!
-//! In: flags and environment variables, or a [`Config`] made by code. Out: a checked one.
+//! In: flags and environment variables, or a [`Config`] made by code. Out: a checked [`Config`].
 //!
 //! What can go wrong: settings contradict each other, or allow more memory than the machine has. [`Config::validate`]
 //! refuses the first, [`MemoryBound`] computes the second.

@@ -5,7 +5,7 @@ use bagtrack_ingest::video::Launcher;
 use ipnet::IpNet;
 use std::time::Duration;
 
-/// In place of the name of the program that decodes videos: there is none.
+/// This value of the setting `ffmpeg` refuses videos.
 pub const OFF: &str = "off";
 
 settings! {

@@ -1,4 +1,4 @@
-//! How much memory the service takes at most, by its settings.
+//! A bound of the memory that the service takes, from its settings.
 
 use super::limits::OFF;
 use super::service::Config;
@@ -8,31 +8,32 @@ use bagtrack_net::MAX_UNSENT_BYTES;
 use bagtrack_sessions::{MAX_LIST_BYTES, threads_of};
 use bagtrack_tracker::MAX_WORKING_SIDE;
 
-/// Most bytes of a buffer of a connection, and so of the head of a request. A stream's buffers take their place.
+/// Most bytes of a buffer of a connection, and so of the head of a request. A stream has its own buffers instead.
 pub const MAX_BUFFER_BYTES: usize = 32 << 10;
-/// A connection may have as many: a head, a body that has begun behind it, the room for more of that, and what it is to
-/// write.
+/// Most buffers of a connection: a request's head, the begun body behind it, the room for more of the body, and the
+/// answer's bytes.
 const BUFFERS: u64 = 4;
-/// Connections beside `max_connections` on which addresses that have no more of those are asked for their health, and
-/// refused the rest.
+/// Connections besides `max_connections`, for addresses that may have no more of those: they get the answer to a health
+/// check, and nothing else.
 pub const PROBE_CONNECTIONS: usize = 32;
-/// The program, its tables, the log's queue, and what the allocator keeps for itself.
+/// Bytes of the program, its tables, the log's queue, and the allocator's own use.
 const PROGRAM: u64 = 96 << 20;
-/// What a worker keeps from frame to frame: buffers of the decoder and the tracker's workspace.
+/// Bytes that a worker keeps from frame to frame: buffers of the decoder and the tracker's workspace.
 const WORKER: u64 = 64 << 20;
 /// The largest working image of a frame that waits for its turn in a request: luma, and chroma in half of its columns
 /// and rows.
 const WORKING_IMAGE: u64 = MAX_WORKING_SIDE as u64 * MAX_WORKING_SIDE as u64 * 3 / 2;
-/// A connection's tasks, beside its buffers.
+/// Bytes of a connection's tasks, besides its buffers.
 const CONNECTION: u64 = 16 << 10;
-/// What TLS keeps of a connection: what waits to be sent, a handshake message that is not whole, and a record's text.
+/// Bytes that TLS keeps for a connection: those that wait to be sent, an incomplete handshake message, and a record's
+/// plain text.
 #[cfg(feature = "tls")]
 const TLS_CONNECTION: u64 = MAX_UNSENT_BYTES as u64 + (64 << 10) + (32 << 10);
 
-/// What a store in a folder keeps: what is on its way to tables, and blocks that were read.
+/// Bytes of a store in a folder: written entries that are not in tables yet, and blocks that were read.
 const FILE_STORE: u64 = 128 << 20;
 
-/// Bytes that the parts of the service take at most.
+/// Most bytes that each part of the service takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MemoryBound {
     /// Bodies of requests, decoded copies and unread answers included.
@@ -50,7 +51,7 @@ pub struct MemoryBound {
 }
 
 impl MemoryBound {
-    /// Of a service with these settings.
+    /// The bound for a service with these settings.
     pub fn of(config: &Config) -> Self {
         let count = |n: usize| n as u64;
         let workers = count(config.worker_count());
@@ -61,8 +62,9 @@ impl MemoryBound {
         let thread = WORKER + WORKING_IMAGE + count(MAX_LIST_BYTES);
         Self {
             uploads: count(config.max_upload_bytes),
-            // There are quick and slow workers. Of the work on several frames some more may wait between two of them,
-            // with what its thread keeps. Each has a frame and a copy of its session's targets.
+            // There are as many quick workers as slow ones, and each has a frame. Further threads hold work that waits
+            // between two of its frames. Each thread keeps buffers, a working image and a copy of its session's
+            // targets.
             work: (workers.saturating_mul(2).saturating_mul(frame))
                 .saturating_add(threads.saturating_mul(thread)),
             sessions: count(config.session_bytes()),
@@ -75,7 +77,7 @@ impl MemoryBound {
             },
             videos: match config.limits.ffmpeg.as_str() {
                 OFF => 0,
-                // Each has its video as a file in memory.
+                // Each decoder has its video as a file in memory.
                 _ => {
                     let video = MAX_DECODER_MEMORY.saturating_add(count(config.max_body_bytes));
                     count(config.video_places()).saturating_mul(video)
@@ -84,7 +86,7 @@ impl MemoryBound {
         }
     }
 
-    /// All parts together, with the program itself.
+    /// The sum of all parts, with the program itself.
     pub fn total(&self) -> u64 {
         let beside = [
             self.uploads,
@@ -135,7 +137,7 @@ mod tests {
         assert!(with(&|c| c.tls.tls_cert = Some("cert.pem".into())) > before);
     }
 
-    /// It was a panic at the start.
+    /// An overflow would panic at the start of the service.
     #[test]
     fn the_bound_of_the_largest_settings_is_a_number() {
         let config = Config {

@@ -14,7 +14,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// What a session with usual parameters is charged at most.
+/// Most bytes that a session with usual parameters is charged.
 const USUAL_SESSION_BYTES: usize = 512 << 10;
 
 settings! {
@@ -105,14 +105,14 @@ settings! {
     }
 }
 
-/// Bytes of a request body that give its client a second more: a video may take longer than a frame.
+/// For this many bytes of a request body its client gets a second more, since a video may take longer than a frame.
 pub const BODY_BYTES_PER_SECOND: u32 = 64 << 10;
 
 impl Config {
     /// Checks every setting.
     ///
     /// # Errors
-    /// The first setting that is out of its range, by its flag and variable.
+    /// A setting is out of its range; the error names the flag and the variable of the first such one.
     pub fn validate(&self) -> Result<(), ConfigError> {
         self.check_ranges()?;
         self.store.check_address()?;
@@ -144,7 +144,7 @@ impl Config {
         self.worker_count().div_ceil(8).clamp(1, cores())
     }
 
-    /// How many videos are decoded at the same time. A client has one of these places.
+    /// How many videos are decoded at the same time. A client may have one of these places.
     pub fn video_places(&self) -> usize {
         self.worker_count().clamp(2, 4)
     }

@@ -1,7 +1,7 @@
-//! Settings as rows of a table: the text, the name, the type, the default and the range of each stand in one place,
-//! below the heading that it has in the help.
+//! Settings as rows of a table: the help text, the name, the type, the default and the range of each setting stand in
+//! one place, below its heading in the help.
 //!
-//! The macro [`settings`] makes of such a table the struct, its defaults, its flags with their environment variables,
+//! From such a table the macro [`settings`] makes the struct, its defaults, its flags with their environment variables,
 //! and the check of its ranges.
 
 use super::base_path::BasePath;
@@ -15,7 +15,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// A text that does not show itself in debug output.
+/// A text that debug output does not show.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Secret(String);
 
@@ -50,15 +50,15 @@ impl std::fmt::Debug for Secret {
     }
 }
 
-/// A value that is written on the command line.
+/// A type of values on the command line.
 pub(super) trait Value: Clone + Send + Sync + 'static {
-    /// What stands for it in the help, where that is not the setting's name.
+    /// The name of the value in the help, where that is not the setting's name.
     const NAME: Option<&'static str> = None;
-    /// Whether the help leaves out what the environment says.
+    /// Whether the help hides the value that the environment gives.
     const IS_SECRET: bool = false;
-    /// Reads it.
+    /// The parser of the value's text.
     fn parser() -> ValueParser;
-    /// As it is written.
+    /// The text of the value, as it is written on the command line.
     fn written(&self) -> String {
         String::new()
     }
@@ -123,7 +123,7 @@ impl Value for Secret {
 pub(super) trait Setting: Sized {
     /// Completes the flag of a setting with this default.
     fn flag(arg: Arg, default: &Self) -> Arg;
-    /// The setting of this name, out of what was given.
+    /// Takes the setting of this name from the given flags and variables.
     fn take(matches: &mut ArgMatches, name: &str) -> Self;
 }
 
@@ -193,7 +193,7 @@ pub(super) fn flag<S: Setting>(
     S::flag(arg, default)
 }
 
-/// What a setting's value must be, where it is out of its range.
+/// Checks a setting's value. The error says what the value must be.
 pub(super) type Range<T> = fn(&T) -> Result<(), &'static str>;
 
 /// At least 1.
@@ -201,7 +201,7 @@ pub(super) fn positive<T: From<u8> + PartialOrd>(value: &T) -> Result<(), &'stat
     in_range(*value >= T::from(1), "at least 1")
 }
 
-/// At least 1, where it is given.
+/// At least 1, or not given.
 pub(super) fn positive_share(value: &Option<usize>) -> Result<(), &'static str> {
     value.as_ref().map_or(Ok(()), positive)
 }
@@ -212,7 +212,7 @@ pub(super) fn threads(value: &Option<usize>) -> Result<(), &'static str> {
     in_range(hold, "from 1 to 1024")
 }
 
-/// As many as a semaphore has at most.
+/// A number of permits that a semaphore can have.
 pub(super) fn permits(value: &usize) -> Result<(), &'static str> {
     let most = tokio::sync::Semaphore::MAX_PERMITS;
     in_range((1..=most).contains(value), "from 1 to 2^61 - 1")
@@ -220,13 +220,13 @@ pub(super) fn permits(value: &usize) -> Result<(), &'static str> {
 
 const YEAR: Duration = Duration::from_secs(365 * 24 * 3600);
 
-/// A time that something takes.
+/// A time that must not be zero: from 1 ms to 1 year.
 pub(super) fn moment(value: &Duration) -> Result<(), &'static str> {
     let range = Duration::from_millis(1)..=YEAR;
     in_range(range.contains(value), "between 1ms and 1 year")
 }
 
-/// A time to wait, or none.
+/// A time to wait, which may be zero: at most 1 year.
 pub(super) fn delay(value: &Duration) -> Result<(), &'static str> {
     in_range(*value <= YEAR, "at most 1 year")
 }
@@ -253,7 +253,7 @@ pub(super) fn hosts(values: &[String]) -> Result<(), &'static str> {
     )
 }
 
-/// Nothing where it is `inside`, else what it must be.
+/// An error with `expected` unless the value is `inside` its range.
 pub(super) fn in_range(inside: bool, expected: &'static str) -> Result<(), &'static str> {
     match inside {
         true => Ok(()),
@@ -270,15 +270,15 @@ pub struct ConfigError {
 }
 
 impl ConfigError {
-    /// That of this setting, where its value is out of this range.
+    /// The error for the setting `name`, where the check of its range has failed.
     pub(super) fn check(name: &'static str, held: Result<(), &'static str>) -> Result<(), Self> {
         held.map_err(|expected| Self { name, expected })
     }
 }
 
 /// Makes a struct of settings from a table with a row for each: its text, `name: type = default`, and its range. A line
-/// `# "Heading"` says what the rows below it stand under in the help. What is set `by_code` has no flag; what is
-/// `flattened` is a table of its own.
+/// `# "Heading"` gives the heading of the rows below it in the help. Settings under `by_code` have no flags; each one
+/// under `flattened` is a table of its own.
 macro_rules! settings {
     (
         $(#[$of_struct:meta])*

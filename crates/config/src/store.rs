@@ -35,7 +35,7 @@ impl StoreConfig {
         matches!(self.address(), Some(StoreAddress::File(_)))
     }
 
-    /// Whether there are settings of a store, and no store.
+    /// Whether settings of a store are given, but no store.
     pub fn lacks_store(&self) -> bool {
         fn of(it: &StoreConfig) -> (Durability, u64, Duration, &str) {
             let prefix = &it.store_prefix;
@@ -58,10 +58,11 @@ impl StoreConfig {
         StoreAddress::parse(text, self.store_timeout).ok()
     }
 
-    /// The store of these settings, which were checked, where they name one. Sessions expire by `clock`.
+    /// The store that these settings, which were checked, name; `None` where they name none. Sessions expire by
+    /// `clock`.
     ///
     /// # Errors
-    /// The folder that they name cannot be used. A Redis may come later.
+    /// The named folder cannot be used. A Redis that is away is no error: it may come later.
     pub async fn connect(
         &self,
         clock: Clock,
