@@ -67,7 +67,7 @@ impl Clock {
         SystemTime::UNIX_EPOCH + self.since_1970(moment)
     }
 
-    /// The same as the time since the beginning of 1970.
+    /// The wall-clock time of a moment of this clock, as the time since the beginning of 1970.
     pub(crate) fn since_1970(&self, moment: Duration) -> Duration {
         let now = self.now();
         let advanced = Duration::from_millis(self.advanced_ms.load(Ordering::Relaxed));

@@ -20,7 +20,7 @@ pub struct TooManySessions(pub usize);
 /// Why there is no session for a client under an id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NoSession {
-    /// There was none, or it was deleted, or it belongs to another client.
+    /// The id never had a session, or its session was ended, or it belongs to another client.
     #[error("there is no such session")]
     Unknown,
     /// No frame came for too long.
@@ -82,7 +82,7 @@ impl Registry {
     /// Whether there is room for one more session, after the expired ones have gone.
     ///
     /// # Errors
-    /// There is none.
+    /// There is no room.
     pub fn check_room(&self) -> Result<(), TooManySessions> {
         if self.len() >= self.max_sessions {
             self.sweep();
@@ -265,7 +265,7 @@ mod tests {
         assert!(!registry.is_live(old.id()) && registry.is_live(third.id()));
         assert_eq!(registry.len(), 2);
 
-        // The same where there is no memory.
+        // The same holds where there is no memory for another state.
         let bytes = third.params().session_bytes();
         let registry = Registry::new(9, 9, LEASE, clock).with_eviction();
         let registry = registry.with_memory(bytes);

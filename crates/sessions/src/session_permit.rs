@@ -36,7 +36,8 @@ impl Session {
         Ok(self.frames_permit(permit.map_err(|_| SessionBusy)?))
     }
 
-    /// The same, but waits for a permit, in order of arrival. An ended session gives permits, too.
+    /// Takes a permit of the session for frames, and waits for it in order of arrival. An ended session gives permits,
+    /// too.
     pub async fn enter_in_order(self: &Arc<Self>) -> SessionPermit {
         let permit = self.permits.clone().acquire_owned().await;
         let permit = permit.expect("the permits are never closed");

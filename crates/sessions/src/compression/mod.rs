@@ -84,12 +84,12 @@ mod tests {
             compress(content, &mut bytes);
             bytes.len()
         };
-        // Of four values three have 2 bits, one has 3: the end of the block needs a code, too. They have one code all
-        // over.
+        // Of four values three have 2 bits, one has 3: the end of the block needs a code, too. All chunks share one
+        // code.
         let of_four = [0, 85, 170, 255].repeat(4096);
         let (least, header) = (16384 * 9 / 4 / 8, 40);
         assert!(compressed(&of_four) < least + header);
-        // What has other bytes gets another one.
+        // Chunks with other bytes get a code of their own.
         let then_noise: Vec<u8> = of_four.into_iter().chain((0..16384).map(noise)).collect();
         assert!(compressed(&then_noise) < least + header + 16384 + 10);
         // A gigabyte of zeros, as DEFLATE writes it at best, is refused before it is there.

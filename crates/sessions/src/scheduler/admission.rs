@@ -76,7 +76,7 @@ impl Admission {
         Ok(Self::on(Executor::threads(workers)?, queue, workers, delay))
     }
 
-    /// The same, with the work done by `executor`.
+    /// As [`new`](Self::new), with the work done by `executor`.
     pub fn on(executor: Executor, queue: usize, workers: usize, delay: Duration) -> Self {
         Self {
             queue: Places::new(queue),
@@ -89,7 +89,7 @@ impl Admission {
     /// [`enter`](Self::enter) is called.
     ///
     /// # Errors
-    /// There is none.
+    /// There is no place.
     pub fn check_place(&self, flow: Flow) -> Result<(), QueueFull> {
         match self.queue.has_place(flow) {
             true => Ok(()),
@@ -105,7 +105,8 @@ impl Admission {
         self.rejoin(Ticket::new(flow, held))
     }
 
-    /// The same, but waits for a place, in order of arrival, and then for a worker, however long that takes.
+    /// Takes a place in the queue, and waits for it in order of arrival. The request then waits for a worker however
+    /// long that takes.
     pub async fn enter_in_order(&self, flow: Flow, held: Reservation) -> QueuePermit {
         let place = self.queue.take_in_order(flow).await;
         QueuePermit::new(Ticket::new(flow, held), place).waiting()

@@ -53,8 +53,8 @@ pub(super) struct Waiting<G> {
     begun: usize,
     pub(super) requests: VecDeque<Request<G>>,
     delay: ControlledDelay,
-    /// When the flow got its first request, by [`Flows::firsts`]. Orders flows that have used the same time, as many
-    /// have that start level.
+    /// When the flow's first request became the first, by the count of `Flows::firsts`. Orders flows that have used the
+    /// same time, as many have that start level.
     since: u64,
     class: SizeClass,
     longest: Faded,
@@ -72,9 +72,9 @@ pub(super) struct Request<G> {
 /// What becomes of the request whose turn it is.
 #[derive(Debug)]
 pub(super) enum Next<G> {
-    /// It gets a worker of this class.
+    /// The request gets a worker of this class.
     Served(Flow, Job, SizeClass, G),
-    /// It has waited too long.
+    /// The request has waited too long.
     Refused(G),
 }
 
@@ -484,7 +484,7 @@ mod tests {
         let mut left: Vec<u64> = flows.flows.keys().map(|flow| flow.0).collect();
         left.sort_unstable();
         assert_eq!(left, [1, 2, 3, 4]);
-        // What was slow long ago is quick again.
+        // A flow that was slow long ago is quick again.
         flows.passed += 60 * HALF_LIFE;
         for flow in 0..all {
             flows.enter(Flow(100 + flow), Duration::ZERO);

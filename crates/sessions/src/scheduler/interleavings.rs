@@ -155,7 +155,7 @@ fn a_client_that_goes_at_any_moment_loses_no_worker_and_no_place() {
                     }
                     Either::Right(_) => true,
                 };
-                // Here it has been dropped.
+                // By now the request's future has been dropped.
                 match begun.load(Ordering::Acquire) {
                     0 => assert!(went, "it was answered, and never begun"),
                     1 if went => note(&within),

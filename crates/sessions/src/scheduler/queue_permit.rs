@@ -17,7 +17,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 #[derive(Debug)]
 pub(super) struct Places {
     queue: Arc<Semaphore>,
-    /// For clients that have no place.
+    /// Spare places, for clients that have none.
     spare: Arc<Semaphore>,
     taken: Mutex<HashMap<Flow, usize>>,
 }
@@ -51,7 +51,7 @@ impl Places {
         Some(self.place(&mut taken, flow, permit))
     }
 
-    /// The same, but waits for a place, in order of arrival.
+    /// Takes a place for this client, and waits for it in order of arrival.
     pub(super) async fn take_in_order(self: &Arc<Self>, flow: Flow) -> Place {
         if let Some(place) = self.take(flow) {
             return place;

@@ -129,7 +129,7 @@ async fn what_another_replica_has_answered_is_answered_again() {
         let tracked = send(&other, Some(number), picture(0, number))
             .await
             .unwrap();
-        // At first the replica has frame 0 in memory, the second time the newest frame.
+        // The first time the replica has the frame before in memory, the second time this frame.
         for _ in 0..2 {
             let again = send(&first, Some(number), picture(0, number))
                 .await

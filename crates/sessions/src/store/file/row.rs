@@ -1,4 +1,4 @@
-//! What the database has of a session beside its state.
+//! The rows of the database: sessions' records without their states.
 
 use super::super::record::{Record, UnreadableRecord, Version};
 use serde::{Deserialize, Serialize};

@@ -59,7 +59,7 @@ impl Transaction<'_> {
         Ok(row.filter(|row| row.expires > self.now))
     }
 
-    /// Those of the sessions that have no record.
+    /// Those of `names` that have no record any more.
     pub(super) fn gone(&mut self, names: &[SessionName]) -> Result<Vec<SessionName>, Fault> {
         let mut gone = Vec::new();
         for name in names {
@@ -267,7 +267,7 @@ impl Transaction<'_> {
         Ok(new)
     }
 
-    /// What the store has noted of itself under this name.
+    /// The store's note of this name, where there is one of `N` bytes.
     pub(super) fn note<const N: usize>(&self, name: &str) -> fjall::Result<Option<[u8; N]>> {
         let note = self.inner.get(&self.database.tables.notes, name)?;
         Ok(note.and_then(|bytes| bytes.get(8..)?.try_into().ok()))

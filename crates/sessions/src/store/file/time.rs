@@ -67,7 +67,7 @@ impl Time {
         u64::try_from(self.start.saturating_add(passed(&self.clock))).unwrap_or(0)
     }
 
-    /// What is to be noted, where the clock was set, or nothing was noted for long.
+    /// The note that is due, where the wall clock was set or the last note is old.
     pub(super) fn due(&self) -> Option<Noted> {
         let (now, last) = (self.now(), self.noted);
         let ahead = wall(&self.clock).saturating_sub_unsigned(now);

@@ -26,7 +26,7 @@ pub struct NewHash {
     pub ttl: Duration,
 }
 
-/// What runs the scripts of a store in place of a Redis: the server of a simulation.
+/// A stand-in for a Redis that runs the scripts of a store: the server of a simulation.
 pub trait ScriptServer: fmt::Debug + Send + Sync {
     /// Makes the hash `new`, where given, and runs the script: both or neither.
     ///
@@ -184,7 +184,7 @@ return {1, ARGV[7]}
 ";
 
 /// ARGV: incarnation, milliseconds for which the session is known to have ended. Answers 0 where it had ended before.
-/// It deletes first, which makes room, so this works where the memory is used up.
+/// The script deletes first, which makes room, so it works where the memory is used up.
 const END: &str = r"
 local key, ended = KEYS[1], KEYS[2]
 local incarnation = redis.call('HGET', key, 'incarnation')
