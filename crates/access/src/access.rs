@@ -44,7 +44,7 @@ pub enum AccessError {
 /// What a request was let in with.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Credential {
-    /// Whose sessions it opens.
+    /// The client whose sessions the credential opens.
     pub owner: Owner,
     /// The digest of the presented API key, or of the one with which the session token was made.
     pub key: Option<blake3::Hash>,

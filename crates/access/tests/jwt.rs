@@ -311,7 +311,7 @@ async fn the_issuer_may_change_its_keys_and_be_away() {
     assert!(taken(&of_old, 31).await.is_ok());
     assert_eq!(reads(), 2);
 
-    // Another key under the name of the one before: names need not be given.
+    // The issuer replaces a key by another one under the same name.
     let other = IssuerKey::p256("new");
     let of_other = long(&other);
     source.give(&[&old, &other]);
@@ -386,7 +386,7 @@ async fn an_issuer_that_hangs_holds_nobody_up_whose_key_is_known() {
         // The reading in the background has begun by then.
         tokio::time::sleep(SHORT).await;
     }
-    // Whoever has another key waits for the issuer.
+    // A token of an unknown key waits for the issuer.
     let mut waiting = tokio::spawn({
         let verifier = verifier.clone();
         async move { verifier.identify(&of_unknown, at(NOW + 1301)).await }

@@ -194,7 +194,7 @@ fn read(path: &Path, flag: &'static str) -> Result<Vec<u8>, CertificateError> {
     std::fs::read(path).map_err(|source| unreadable(path, flag, source))
 }
 
-/// Refuses a pipe, whose writer has gone: reading it again would wait for ever.
+/// Refuses files that are not regular: reading a pipe again, whose writer has gone, would block for ever.
 fn check_regular(path: &Path, flag: &'static str) -> Result<(), CertificateError> {
     let file = std::fs::metadata(path);
     let refused = match file {

@@ -58,7 +58,7 @@ pub struct MessageTooSlow;
 /// The rest of a client's frame that was not handed over yet.
 #[derive(Debug)]
 struct Frame {
-    /// Its first byte.
+    /// The first byte of its head.
     first: u8,
     mask: Option<[u8; 4]>,
     left: u64,

@@ -85,7 +85,7 @@ impl FrameRate {
     }
 
     fn note_left(&self, left: u32) {
-        // Nothing panics while it is held.
+        // Nothing panics while the lock is held.
         let mut noted = self.left.lock().unwrap_or_else(PoisonError::into_inner);
         *noted = (left, clock::now());
     }

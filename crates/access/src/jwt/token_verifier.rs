@@ -54,7 +54,7 @@ pub enum TokenError {
     /// The token's algorithm is not one of public keys.
     #[error("the token is signed with {0:?}, not with the issuer's key")]
     Algorithm(Algorithm),
-    /// Its header says that what this service does not know has to be understood (RFC 7515, section 4.1.11).
+    /// The token's header has critical parameters, and this service knows none (RFC 7515, section 4.1.11).
     #[error("the token's header has critical parameters (`crit`), and this service knows none")]
     Critical,
     /// The issuer has no key with the name and the algorithm of the token.
@@ -63,10 +63,10 @@ pub enum TokenError {
     /// The token was changed, or another key has signed it.
     #[error("the token's signature is wrong")]
     Signature,
-    /// Its time is over.
+    /// The token's time is over.
     #[error("the token has expired")]
     Expired,
-    /// Its time has not come.
+    /// The token's time has not come.
     #[error("the token is not valid yet")]
     Early,
     /// The token is of another issuer.
@@ -389,7 +389,7 @@ mod tests {
         };
         let (soon, later) = (now + LEEWAY, now + MAX_AGE);
         for number in 0..MAX_CHECKED {
-            // One of them lives.
+            // The first token lives longer than the others.
             let expires = if number == 0 { later } else { soon };
             assert_eq!(remember(number, expires, now), number + 1);
         }
@@ -397,7 +397,7 @@ mod tests {
         for number in 2..MAX_CHECKED {
             assert_eq!(remember(MAX_CHECKED + number, later, soon), number + 1);
         }
-        // All of them live.
+        // All tokens live, so all are dropped.
         assert_eq!(remember(3 * MAX_CHECKED, later, soon), 1);
     }
 }

@@ -56,8 +56,8 @@ enum Source {
 enum Strictness {
     /// All damage that it finds: it ends there, and leaves no pictures out.
     All,
-    /// All but a picture that others are made from and that is missing, as at the start of a video that was cut where
-    /// pictures before the cut are needed. The program leaves out those that it cannot make.
+    /// All but missing reference pictures, as at the start of a video that was cut where pictures need others before
+    /// the cut. The program leaves out the pictures that it cannot decode.
     AllButReferences,
 }
 
@@ -411,7 +411,7 @@ fn arguments(input: &[&OsStr], limits: VideoLimits, strictness: Strictness) -> V
     options.chain(input).chain(output).collect()
 }
 
-/// Whether a signal ended the process, as after its processor time.
+/// Whether one of the signals for used-up processor time ended the process.
 #[cfg(unix)]
 fn is_out_of_time(status: ExitStatus) -> bool {
     let signal = std::os::unix::process::ExitStatusExt::signal(&status);

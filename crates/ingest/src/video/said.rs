@@ -60,7 +60,7 @@ impl Said {
     }
 
     fn lock(&self) -> MutexGuard<'_, Heard> {
-        // Nothing panics while it is held.
+        // Nothing panics while the lock is held.
         self.0.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -201,17 +201,17 @@ fn is_memory(line: &str) -> bool {
 /// picture, as at the start of a recording that begins between two of them.
 fn is_reference(line: &str) -> bool {
     let says = [
-        // Of H.264 and H.265.
+        // Messages of H.264 and H.265.
         "eference picture",
         "mmco: ",
         "co located POCs",
         "find ref with POC",
-        // Of H.264, and what follows from it.
+        // Messages of H.264, and those that follow from them.
         "non-existing PPS",
         "non-existing SPS",
         "decode_slice_header error",
         "no frame!",
-        // Of H.265, and of MPEG-2.
+        // Messages of H.265, and of MPEG-2.
         "PPS id out of range",
         "Invalid frame dimensions 0x0",
     ];

@@ -37,7 +37,7 @@ pub fn video_format(bytes: &[u8], media_type: &str) -> Option<VideoFormat> {
 mod tests {
     use super::*;
 
-    /// Its first box must not make it count as an MP4 file.
+    /// The letters `ftyp` at byte 4 must not make a JPEG count as an MP4 file.
     #[test]
     fn a_jpeg_whose_first_segment_spells_ftyp_is_a_picture() {
         let jpeg = b"\xFF\xD8\xFF\xE0ftyp";
