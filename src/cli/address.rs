@@ -6,9 +6,9 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 /// Where a running service is found.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Addresses {
-    /// On this machine.
+    /// The address on this machine.
     pub here: Option<String>,
-    /// On other machines of the network.
+    /// The address for other machines of the network.
     pub elsewhere: Option<String>,
 }
 

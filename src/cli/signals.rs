@@ -43,7 +43,7 @@ impl Signals {
     async fn nth(&mut self, index: usize) -> Shutdown {
         match self.0.wait_for(|signals| signals.len() > index).await {
             Ok(signals) => signals[index],
-            // No more signals can be heard.
+            // The task that listens has ended, so no signal can come any more.
             Err(_) => std::future::pending().await,
         }
     }
@@ -120,7 +120,7 @@ pub fn outlive_file_limit() -> io::Result<()> {
     signal_hook::flag::register(signal_hook::consts::SIGXFSZ, seen).map(drop)
 }
 
-/// There is no such limit here.
+/// Other systems have no such limit.
 #[cfg(not(unix))]
 pub fn outlive_file_limit() -> io::Result<()> {
     Ok(())
@@ -138,7 +138,7 @@ pub async fn reload(mut hangups: Hangups, reloaded: Reloaded) {
     }
 }
 
-/// There is no such signal here.
+/// Other systems have no such signal.
 #[cfg(not(unix))]
 pub struct Hangups;
 

@@ -278,7 +278,7 @@ fn read(index: u64, path: &Path) -> Result<FrameFile, String> {
     })
 }
 
-/// Refuses photos, archives and texts by name: ffmpeg would call them damaged videos.
+/// Refuses photos, archives and texts with an error that names their type: ffmpeg would call them damaged videos.
 fn check_is_video(path: &Path) -> Result<(), Box<dyn Error>> {
     let mut start = Vec::new();
     let file = fs::File::open(path);
