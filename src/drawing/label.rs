@@ -2,9 +2,9 @@
 
 use font8x8::legacy::BASIC_LEGACY;
 
-/// Width of a letter.
+/// Width of a letter in pixels.
 pub(super) const WIDTH: u32 = 8;
-/// Height of a letter.
+/// Height of a letter in pixels.
 pub(super) const HEIGHT: u32 = 8;
 
 /// Whether a letter of `text`, which is ASCII in one line, covers this pixel.

@@ -25,7 +25,7 @@ pub(super) struct Jpeg<'file> {
 }
 
 impl<'file> Jpeg<'file> {
-    /// Reads the markers.
+
     pub(super) fn read(bytes: &'file [u8], limits: &Limits) -> Result<Self, IngestError> {
         let damaged = |reason: &str| Format::Jpeg.damaged(reason);
         let markers = Markers::read(bytes).map_err(damaged)?;
@@ -51,7 +51,7 @@ impl<'file> Jpeg<'file> {
         upright_size(stored, self.orientation)
     }
 
-    /// Its luma and chroma: at full size or reduced.
+    /// Decodes luma and chroma, at full size or reduced to no less than `format`.
     pub(super) fn decode<'scratch>(
         &self,
         limits: &Limits,

@@ -38,7 +38,7 @@ impl<'a> Bits<'a> {
     }
 }
 
-/// A prefix code.
+
 pub(super) struct Code {
     /// How many codes have each length in bits; all 0 where there is a single symbol, which takes no bit.
     counts: [u16; MAX_LENGTH + 1],
@@ -47,7 +47,7 @@ pub(super) struct Code {
 }
 
 impl Code {
-    /// Reads the code of an alphabet.
+    /// Reads the code of an alphabet of `alphabet` symbols; `None` where the bits are no complete code.
     pub(super) fn read(bits: &mut Bits, alphabet: usize) -> Option<Self> {
         if bits.bit()? == 1 {
             let has_two = bits.bit()? == 1;
@@ -119,7 +119,7 @@ impl Code {
         Some(Self { counts, symbols })
     }
 
-    /// Reads a symbol.
+
     pub(super) fn symbol(&self, bits: &mut Bits) -> Option<u16> {
         if let [symbol] = self.symbols[..] {
             return Some(symbol);

@@ -80,7 +80,7 @@ impl<'file> WebPFile<'file> {
         upright_size(self.decoder.dimensions(), self.orientation)
     }
 
-    /// Its luma and chroma.
+    /// Decodes luma and chroma.
     pub(super) fn decode(
         self,
         limits: &Limits,

@@ -11,7 +11,7 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 use tokio::sync::Notify;
 
-/// The origin of moments here.
+/// Moments of this module are counted from here.
 static START: LazyLock<Instant> = LazyLock::new(clock::now);
 
 const IDLE: u8 = 0;

@@ -83,7 +83,7 @@ impl Holdings {
         }
     }
 
-    /// Whether nothing is held.
+
     pub(super) fn is_empty(&self) -> bool {
         let budgets = [
             &self.sessions,

@@ -73,7 +73,7 @@ impl SessionState {
         self.targets.trackers().first().params()
     }
 
-    /// How frames are decoded.
+    /// The format in which frames are decoded for all targets.
     pub fn frame_format(&self) -> FrameFormat {
         self.targets.frame_format()
     }

@@ -189,7 +189,7 @@ impl Targets {
         self.0.map(Tracker::estimate)
     }
 
-    /// How frames are decoded.
+    /// The format in which frames are decoded for all targets.
     pub(super) fn frame_format(&self) -> FrameFormat {
         largest_format(self.0.as_slice().iter().map(Tracker::frame_format))
     }

@@ -257,7 +257,7 @@ impl TokenVerifier {
         }
     }
 
-    /// Checks a token with these keys.
+
     fn check(
         &self,
         token: &str,

@@ -132,7 +132,7 @@ fn times_log2(n: u32) -> f32 {
     n * (exponent as f32 + (2.0 - mantissa / 3.0) * mantissa - 5.0 / 3.0)
 }
 
-/// The bits that the symbols take.
+/// The bits that the symbols take with codes of these lengths.
 fn size(counts: &[u32; SYMBOLS], lengths: &[u8; SYMBOLS]) -> usize {
     let size_of = |(&count, &length): (&u32, &u8)| count as usize * usize::from(length);
     counts.iter().zip(lengths).map(size_of).sum()

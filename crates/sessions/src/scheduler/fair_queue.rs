@@ -217,7 +217,7 @@ impl fmt::Debug for FairQueue {
 }
 
 impl WorkerSlot {
-    /// The class of the worker.
+
     pub(super) fn class(&self) -> SizeClass {
         self.class
     }

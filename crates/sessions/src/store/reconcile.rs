@@ -22,7 +22,7 @@ pub enum Intent {
 /// Why a session is gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Gone {
-    /// It was ended.
+    /// The session was ended.
     Ended,
     /// The store has no record of it: its time is over, or the store has lost it.
     NoRecord,

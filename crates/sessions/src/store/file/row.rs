@@ -14,7 +14,7 @@ pub(super) struct Row {
     pub(super) incarnation: u64,
     /// When the time to live is over, in milliseconds of the folder's time.
     pub(super) expires: u64,
-    /// Length of the state.
+    /// Bytes of the state.
     pub(super) state_bytes: u64,
     /// See [`Record::head`].
     head: Vec<u8>,

@@ -164,7 +164,7 @@ impl RedisStore {
             .is_some_and(|until| *until > now)
     }
 
-    /// Refuses a client for a moment.
+    /// Refuses a client for [`REFUSED`] without looking for room again.
     fn refuse(&self, client: &str) {
         let now = self.0.clock.now();
         let mut refused = lock(&self.0.refused);

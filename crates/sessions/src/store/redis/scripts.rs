@@ -73,7 +73,7 @@ impl Script {
 }
 
 impl ScriptCall<'_> {
-    /// Adds a key.
+
     pub(super) fn key(&mut self, key: impl Into<String>) -> &mut Self {
         self.keys.push(key.into());
         self
