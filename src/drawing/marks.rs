@@ -5,7 +5,6 @@ use super::picture::Picture;
 use bagtrack_tracker::{Estimate, Rect, Status};
 use image::{Rgb, RgbImage};
 
-
 const PARTICLE: Rgb<u8> = Rgb([255, 240, 60]);
 /// How opaque particles of the least and of the greatest weight are, from 0 to 1.
 const COVER: [f64; 2] = [0.25, 0.9];

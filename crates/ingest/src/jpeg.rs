@@ -25,7 +25,6 @@ pub(super) struct Jpeg<'file> {
 }
 
 impl<'file> Jpeg<'file> {
-
     pub(super) fn read(bytes: &'file [u8], limits: &Limits) -> Result<Self, IngestError> {
         let damaged = |reason: &str| Format::Jpeg.damaged(reason);
         let markers = Markers::read(bytes).map_err(damaged)?;

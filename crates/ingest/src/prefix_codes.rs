@@ -38,7 +38,6 @@ impl<'a> Bits<'a> {
     }
 }
 
-
 pub(super) struct Code {
     /// How many codes have each length in bits; all 0 where there is a single symbol, which takes no bit.
     counts: [u16; MAX_LENGTH + 1],
@@ -118,7 +117,6 @@ impl Code {
         }
         Some(Self { counts, symbols })
     }
-
 
     pub(super) fn symbol(&self, bits: &mut Bits) -> Option<u16> {
         if let [symbol] = self.symbols[..] {

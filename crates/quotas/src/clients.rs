@@ -83,7 +83,6 @@ impl Holdings {
         }
     }
 
-
     pub(super) fn is_empty(&self) -> bool {
         let budgets = [
             &self.sessions,

@@ -257,7 +257,6 @@ impl TokenVerifier {
         }
     }
 
-
     fn check(
         &self,
         token: &str,

@@ -7,7 +7,6 @@ const MAX_LENGTH: usize = 15;
 /// A bound of the tree's depth for counts of 32 bits. Counts that grow as Fibonacci's numbers make the deepest tree.
 const MAX_DEPTH: usize = 48;
 
-
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Code {
     /// The first bit lowest.

@@ -217,7 +217,6 @@ impl fmt::Debug for FairQueue {
 }
 
 impl WorkerSlot {
-
     pub(super) fn class(&self) -> SizeClass {
         self.class
     }

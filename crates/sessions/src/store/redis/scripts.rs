@@ -73,7 +73,6 @@ impl Script {
 }
 
 impl ScriptCall<'_> {
-
     pub(super) fn key(&mut self, key: impl Into<String>) -> &mut Self {
         self.keys.push(key.into());
         self
