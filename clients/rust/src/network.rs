@@ -1,4 +1,4 @@
-//! What carries requests in place of connections.
+//! How requests are carried: by HTTP connections, or by a simulated network.
 
 use reqwest::{Request, Response};
 use std::fmt;
@@ -6,16 +6,16 @@ use std::pin::Pin;
 use std::sync::Arc;
 use uuid::Uuid;
 
-/// A simulated network, with what clients draw: so the same happens again from the same seed.
+/// A simulated network, which also gives the client's random numbers, so that a run can be repeated.
 pub trait Network: fmt::Debug + Send + Sync {
-    /// The answer to a request, within [its time](Request::timeout). Where the line breaks its body fails.
+    /// The answer to a request, within [its time](Request::timeout). If the connection breaks, reading the body fails.
     fn send(&self, request: Request) -> Pin<Box<dyn Future<Output = Response> + Send + '_>>;
 
-    /// A random number.
+    /// A uniform random number.
     fn random(&self) -> u128;
 }
 
-/// What carries requests.
+/// Carries requests.
 #[derive(Debug, Clone)]
 pub enum Carrier {
     Connections(reqwest::Client),
@@ -23,7 +23,7 @@ pub enum Carrier {
 }
 
 impl Carrier {
-    /// What makes requests.
+    /// The HTTP client, which builds requests in both cases.
     pub fn http(&self) -> &reqwest::Client {
         match self {
             Self::Connections(http) | Self::Network(_, http) => http,
@@ -47,7 +47,7 @@ impl Carrier {
         }
     }
 
-    /// A number from 0 to 1.
+    /// A random number from 0 to 1.
     pub fn fraction(&self) -> f64 {
         match self {
             Self::Connections(_) => rand::random(),

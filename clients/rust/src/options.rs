@@ -1,10 +1,10 @@
-//! How a session is opened.
+//! The options of a new session.
 
 use crate::transport::Query;
 use bagtrack_api::{PresetName, Rect};
 use serde_json::{Map, Value};
 
-/// What is followed: a `Rect`, or several in a `Vec` or an array.
+/// The targets to follow: a `Rect`, or several in a `Vec` or an array, in pixels of the first frame.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Targets {
     /// One target.
@@ -43,7 +43,7 @@ impl Targets {
     }
 }
 
-/// The tracker's settings; without them those of the service.
+/// The tracker's settings; the service's defaults apply to those that are not set.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct OpenOptions {
     preset: Option<PresetName>,
@@ -52,7 +52,7 @@ pub struct OpenOptions {
 }
 
 impl OpenOptions {
-    /// Nothing is set.
+    /// Options with nothing set.
     pub fn new() -> Self {
         Self::default()
     }
@@ -63,14 +63,14 @@ impl OpenOptions {
         self
     }
 
-    /// The seed of all random draws: the same frames, box and seed give the same boxes. Otherwise the service draws
-    /// one.
+    /// The seed of all random draws: the same frames, box and seed give the same boxes. Without it, the service draws a
+    /// seed.
     pub fn seed(mut self, seed: u64) -> Self {
         self.seed = Some(seed);
         self
     }
 
-    /// A parameter that is set otherwise than in the preset: `parameter("bag_size", 5)`.
+    /// Changes a parameter of the preset: `parameter("bag_size", 5)`.
     pub fn parameter(mut self, name: &str, value: impl Into<Value>) -> Self {
         self.parameters.insert(name.to_owned(), value.into());
         self

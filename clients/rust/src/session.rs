@@ -1,4 +1,4 @@
-//! A session: frames go in, boxes come back.
+//! A session: takes frames, and returns boxes.
 
 use crate::error::ClientError;
 use crate::remote::Remote;
@@ -7,7 +7,7 @@ use bagtrack_api::{Answer, Rect};
 use bytes::Bytes;
 use uuid::Uuid;
 
-/// Follows targets through frames at a service. It has one frame after the other on its way.
+/// Follows targets through frames at a service. Sends one request after the other.
 #[derive(Debug)]
 pub struct Session(Remote);
 
@@ -16,23 +16,23 @@ impl Session {
         Self(remote)
     }
 
-    /// Its id at the service, which changes when the session is opened again.
+    /// The session's id at the service, which changes when the client opens the session again.
     pub fn id(&self) -> Uuid {
         self.0.id()
     }
 
-    /// The number of the last frame that was answered; that of the first is 0.
+    /// The number of the last answered frame; the first frame is 0.
     pub fn frame(&self) -> u64 {
         self.0.answered()
     }
 
-    /// From a service with a store: the last frame whose state is in the store, as the last answer has it.
+    /// From a service with a store: the last frame whose state is in the store, as of the last answer.
     pub fn checkpoint(&self) -> Option<u64> {
         self.0.standing().checkpoint
     }
 
-    /// Whether the service was about to end at the last answer. The session goes on elsewhere by itself, where there is
-    /// another one.
+    /// Whether the service was about to end at the last answer. The client then moves the session to another service,
+    /// if there is one.
     pub fn is_draining(&self) -> bool {
         self.0.standing().draining
     }
@@ -45,13 +45,13 @@ impl Session {
     /// Finds the targets in the next frame: the bytes of a JPEG, PNG or WebP file of the first frame's size.
     ///
     /// # Errors
-    /// The service refuses the frame, and the session is as it was; or it gives no answer, and the next call sends the
+    /// The service refuses the frame, and the session is unchanged; or it does not answer, and the next call sends the
     /// frame before its own.
     pub async fn track(&mut self, frame: impl Into<Bytes>) -> Result<Answer, ClientError> {
         self.next(vec![frame.into()], None).await
     }
 
-    /// Sends the next frames in one request. If one is bad, none is taken, and the problem has its `index`.
+    /// Sends the next frames in one request. If a frame is bad, none is tracked, and the problem has its `index`.
     ///
     /// # Errors
     /// As [`track`](Self::track).
@@ -67,8 +67,8 @@ impl Session {
         self.0.advance(Upload { frames, correction }).await
     }
 
-    /// Sends the next frame with the right box of a target in it; targets are counted from 0. The frame may be one that
-    /// was sent before: it counts as the next one.
+    /// Sends the next frame with the right box of a target in it, in pixels; targets are counted from 0. The image may
+    /// be one that was sent before: it counts as a new frame.
     ///
     /// # Errors
     /// As [`track`](Self::track).
@@ -81,7 +81,7 @@ impl Session {
         self.next(vec![frame.into()], Some((target, rect))).await
     }
 
-    /// The whole session as bytes, for [`Client::restore`](crate::Client::restore).
+    /// A snapshot of the session, for [`Client::restore`](crate::Client::restore).
     ///
     /// # Errors
     /// The service refuses, or gives no answer.
@@ -89,7 +89,7 @@ impl Session {
         self.0.snapshot().await
     }
 
-    /// Ends the session. One that is only dropped expires after a while.
+    /// Ends the session. A session that is only dropped expires at the service.
     ///
     /// # Errors
     /// The service refuses, or gives no answer.

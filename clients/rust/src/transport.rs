@@ -1,4 +1,4 @@
-//! Requests over HTTP: one that fails for a moment is sent again.
+//! Requests over HTTP, which are sent again after temporary failures.
 
 use crate::backoff::Backoff;
 use crate::error::{ClientError, causes};
@@ -16,20 +16,20 @@ use serde::de::Error;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
-/// Names and values.
+/// Names and values of query parameters.
 pub type Query = Vec<(&'static str, String)>;
 
 /// A request; it may be sent several times.
 pub struct Request {
     pub method: Method,
-    /// Below the service's address.
+    /// The path below the service's address.
     pub path: String,
     pub query: Query,
     pub body: Body,
 }
 
 impl Request {
-    /// One without settings and body.
+    /// A request without query and body.
     pub fn bare(method: Method, path: String) -> Self {
         let (query, body) = (Query::new(), Body::Empty);
         Self {
@@ -41,7 +41,7 @@ impl Request {
     }
 }
 
-/// What a request carries.
+/// The body of a request.
 pub enum Body {
     Empty,
     /// Bytes of this media type.
@@ -51,7 +51,7 @@ pub enum Body {
 }
 
 impl Body {
-    /// How long it may take over a slow line.
+    /// Additional time for the body over a slow connection.
     fn time(&self) -> Duration {
         let bytes: usize = match self {
             Self::Empty => 0,
@@ -62,7 +62,7 @@ impl Body {
     }
 }
 
-/// What is said of a session beside an answer.
+/// What the headers of an answer say of the session.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Standing {
     /// The last frame whose state is in the store.
@@ -79,7 +79,7 @@ pub struct Reply {
 }
 
 impl Reply {
-    /// The answer, where it is a good one.
+    /// The answer if its status is success; else its problem.
     pub fn checked(self) -> Result<Self, Box<Problem>> {
         match self.status.is_success() {
             true => Ok(self),
@@ -90,7 +90,7 @@ impl Reply {
     /// The snapshot.
     ///
     /// # Errors
-    /// It is something else, such as a page of a proxy.
+    /// The body is no snapshot, but for example a page of a proxy.
     pub fn snapshot(self) -> Result<Bytes, ClientError> {
         let came = self.headers.get(CONTENT_TYPE);
         match came.is_some_and(|came| came == SNAPSHOT) {
@@ -99,7 +99,7 @@ impl Reply {
         }
     }
 
-    /// The problem document; of a proxy's error page one with the status alone.
+    /// The problem document; for an error page of a proxy, one with the status only.
     fn problem(&self) -> Problem {
         let problem = serde_json::from_slice(&self.body).unwrap_or_else(|_| Problem {
             title: self
@@ -116,12 +116,12 @@ impl Reply {
         }
     }
 
-    /// After how long trying again makes sense: in seconds, or, as proxies tell it, from a date on.
+    /// The header `Retry-After`: seconds, or, from some proxies, a date.
     fn retry_after(&self) -> Option<Duration> {
         let seconds = self.number(RETRY_AFTER.as_str());
         seconds.map(Duration::from_secs).or_else(|| {
             let until = self.date(RETRY_AFTER)?;
-            // The clock here may be wrong.
+            // Counts from the `Date` of the answer, since the clock of this machine may be wrong.
             let now = self.date(DATE).unwrap_or_else(SystemTime::now);
             Some(until.duration_since(now).unwrap_or_default())
         })
@@ -146,7 +146,7 @@ impl Reply {
         }
     }
 
-    /// Whether the same request may succeed later: as the service says, or a proxy before it.
+    /// Whether the same request may succeed later, according to the service or a proxy.
     fn is_temporary(&self) -> bool {
         match self.status.as_u16() {
             408 | 429 | 502 | 503 | 504 => true,
@@ -156,13 +156,13 @@ impl Reply {
     }
 }
 
-/// The service, as one session (or a client) reaches it.
+/// How a session or a client reaches the service.
 #[derive(Debug, Clone)]
 pub struct Transport {
     pub carrier: Carrier,
-    /// At least one.
+    /// The addresses of the service, at least one.
     pub addresses: Arc<[Url]>,
-    /// Which of them is in use.
+    /// The index of the address in use.
     pub used: usize,
     pub authorization: Option<HeaderValue>,
     /// The longest time for one request.
@@ -172,20 +172,20 @@ pub struct Transport {
 }
 
 impl Transport {
-    /// Goes on at the next address, where there is more than one.
+    /// Changes to the next address, if there are several.
     pub fn next_address(&mut self) {
         self.used = (self.used + 1) % self.addresses.len();
     }
 
-    /// Pauses for as long as a request is sent again.
+    /// The pauses between the tries of a request.
     pub fn backoff(&self) -> Backoff {
         Backoff::new(self.retry_for, self.carrier.clone())
     }
 
-    /// The answer to a request, which is sent again where that may help.
+    /// The answer to a request. Sends the request again after temporary failures, until the time for retries is up.
     pub async fn call(&mut self, request: &Request) -> Result<Reply, ClientError> {
         let mut backoff = self.backoff();
-        // A line that was idle for long breaks at its next use: the first time nothing is meant by it.
+        // A connection that was idle for long may break at its next use, so the first break is tried again at once.
         let mut has_broken = self.retry_for.is_zero();
         loop {
             match self.attempt(request).await {
@@ -225,7 +225,7 @@ impl Transport {
         let mut sent = self.carrier.http().request(request.method.clone(), url);
         let more = match self.carrier {
             Carrier::Connections(_) => request.body.time(),
-            // Its lines are not slow.
+            // A simulated network needs no time for the body.
             Carrier::Network(..) => Duration::ZERO,
         };
         sent = sent.timeout(self.timeout.saturating_add(more));
@@ -248,8 +248,8 @@ impl Transport {
     }
 }
 
-/// Whether another try would not mend it: what is no request, a certificate that is refused, and HTTPS without a
-/// feature of reqwest for it. The last two are told in words alone.
+/// Whether another try cannot succeed: the request is invalid, a certificate is refused, or reqwest has no feature for
+/// HTTPS. The last two can be recognised only by their text.
 fn is_final(error: &reqwest::Error) -> bool {
     let is_told =
         |text: &String| text.contains("certificate") || text.contains("scheme is not http");

@@ -1,4 +1,4 @@
-//! What is sent in one request, and what opens a session.
+//! The frames of one request, and the origin from which a session is opened.
 
 use crate::transport::{Body, Query, Request};
 use bagtrack_api::Rect;
@@ -7,22 +7,22 @@ use bytes::Bytes;
 use reqwest::Method;
 use uuid::Uuid;
 
-/// Frames of a session.
+/// Frames of a session that are sent in one request.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Upload {
     /// At least one.
     pub frames: Vec<Bytes>,
-    /// With one frame: a target, and its right box.
+    /// With one frame only: the index of a target, and its right box in pixels.
     pub correction: Option<(usize, Rect)>,
 }
 
 impl Upload {
-    /// The number of its last frame, where its first has this one.
+    /// The number of the last frame, if the first one has the number `first`.
     pub fn last(&self, first: u64) -> u64 {
         first + self.frames.len() as u64 - 1
     }
 
-    /// The request that sends it with these numbers.
+    /// The request that sends the frames to this session, numbered from `number`.
     pub fn request(&self, id: Uuid, number: u64) -> Request {
         let mut query: Query = vec![("frame", number.to_string())];
         let (method, path) = match self.correction {
@@ -47,10 +47,10 @@ impl Upload {
     }
 }
 
-/// What opens a session: a first frame with its settings, or a snapshot.
+/// The origin of a session: a first frame with its settings, or a snapshot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Origin {
-    /// The frame that the session stands at then.
+    /// The last frame that the session has when it is opened from this origin.
     pub frame: u64,
     pub query: Query,
     pub media_type: &'static str,

@@ -1,4 +1,4 @@
-//! What is done after each answer, so that the session can go on elsewhere: snapshots, and leaving a service that is
+//! After each answer, makes sure that the session can go on elsewhere: takes snapshots, and leaves a service that is
 //! about to end.
 
 use super::Remote;
@@ -9,7 +9,7 @@ use bagtrack_api::media_types::SNAPSHOT;
 use std::time::Duration;
 use tokio::time::Instant;
 
-/// A service that is about to end may be the only one for a while: how long until the next try to go elsewhere.
+/// The pause between tries to leave a service that is about to end: it may be the only one for a while.
 const MOVE_EVERY: Duration = Duration::from_secs(1);
 
 impl Remote {
@@ -20,7 +20,7 @@ impl Remote {
             draining,
         } = self.standing;
         if let Some(stored) = checkpoint {
-            // A store has the session up to there: any replica goes on with it.
+            // The store has the session up to this frame: any replica can go on with it.
             self.kept.forget_until(stored);
         } else if draining && self.may_try_to_move() {
             self.move_on().await;
@@ -40,7 +40,7 @@ impl Remote {
         tried.is_none_or(|tried| tried.elapsed() >= MOVE_EVERY)
     }
 
-    /// Goes on elsewhere, since the service is about to end. If there is nothing else yet, it goes on here.
+    /// Opens the session at the next address, since the service is about to end. If that fails, stays here.
     async fn move_on(&mut self) {
         self.tried_to_move = Some(Instant::now());
         if !self.renew_origin().await {
@@ -64,7 +64,8 @@ impl Remote {
         }
     }
 
-    /// Takes a snapshot; without it the older one and more frames are kept.
+    /// Takes a snapshot as the new origin, and returns whether it succeeded. Otherwise the older origin stays, with the
+    /// frames after it.
     async fn renew_origin(&mut self) -> bool {
         let snapshot = match self.transport.attempt(&self.request_snapshot()).await {
             Ok(reply) if reply.status.is_success() => reply.snapshot().ok(),

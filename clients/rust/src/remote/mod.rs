@@ -1,5 +1,5 @@
-//! A session at the service: where it stands there, and how it goes on when frames or the whole session are lost.
-//! docs/PROTOCOL.md says what is done when.
+//! A session at the service: which frames it has, and how it goes on when frames or the whole session are lost.
+//! docs/PROTOCOL.md has the rules.
 
 mod checkpoint;
 
@@ -23,9 +23,9 @@ pub struct Remote {
     id: Uuid,
     /// The last frame whose answer the caller has.
     answered: u64,
-    /// The last frame that the service has, as far as is known.
+    /// The last frame that the service has acknowledged.
     last_acknowledged: u64,
-    /// What the last answer said beside it.
+    /// The checkpoint and the drain notice in the last answer's headers.
     standing: Standing,
     kept: Kept,
     snapshot_every: u64,
@@ -33,13 +33,13 @@ pub struct Remote {
     tried_to_move: Option<Instant>,
 }
 
-/// What brings a session back after a refusal.
+/// How to recover a session after a refusal.
 enum Recovery {
     GoOnWith(u64),
     Reopen,
 }
 
-/// Opens a session; asks until there is an answer.
+/// Opens a session; sends the request again until it is answered, or the time for retries is up.
 async fn create(transport: &mut Transport, origin: &Origin) -> Result<CreatedSession, ClientError> {
     let request = origin.request(transport.carrier.new_id());
     let reply = transport.call(&request).await?;
@@ -47,7 +47,7 @@ async fn create(transport: &mut Transport, origin: &Origin) -> Result<CreatedSes
 }
 
 impl Remote {
-    /// Opens a session; the frame of the origin is not looked at.
+    /// Opens a session from an origin, whose `frame` is ignored.
     pub async fn open(
         mut transport: Transport,
         origin: Origin,
@@ -56,7 +56,7 @@ impl Remote {
         let created = create(&mut transport, &origin).await?;
         let mut query = origin.query;
         if origin.media_type == FRAME {
-            // The same boxes come again only with the seed that was drawn.
+            // Keeps the seed that the service has drawn: only with that, a session opened again gives the same boxes.
             query.retain(|(name, _)| *name != "seed");
             let seed = created.parameters.as_ref().and_then(Parameters::seed);
             query.extend(seed.map(|seed| ("seed", seed.to_string())));
@@ -98,10 +98,10 @@ impl Remote {
         self.resent
     }
 
-    /// Sends the next frames, after those that got no answer. At least one answer.
+    /// Sends the next frames, after those that got no answer. Returns at least one answer.
     pub async fn advance(&mut self, upload: Upload) -> Result<Vec<Answer>, ClientError> {
         let before = self.kept.last().unwrap_or(0).max(self.answered);
-        // It is kept before it is sent: a call that is dropped counts as one without answer.
+        // Kept before it is sent, so that a dropped call counts as one without an answer.
         self.kept.put(before + 1, upload);
         let delivered = self.deliver(before + 1).await;
         if let Err(ClientError::Refused(_)) = delivered {
@@ -116,7 +116,7 @@ impl Remote {
         Ok(answers)
     }
 
-    /// Brings the service up to this frame; the answers to the request that has it.
+    /// Brings the service up to this frame. Returns the answers to the request that has the frame.
     async fn deliver(&mut self, number: u64) -> Result<Vec<Answer>, ClientError> {
         let mut backoff = RecoveryBackoff::new(self.transport.backoff());
         loop {
@@ -126,7 +126,7 @@ impl Remote {
             let reply = self.transport.call(&upload.request(self.id, next)).await?;
             let problem = match reply.checked() {
                 Ok(reply) => {
-                    // What is no answer, such as a page of a proxy, acknowledges nothing.
+                    // Parsed first: a page of a proxy, which is no answer, must not acknowledge a frame.
                     let answers: FrameAnswers = serde_json::from_slice(&reply.body)?;
                     let last = upload.last(next);
                     self.last_acknowledged = self.last_acknowledged.max(last);
@@ -152,7 +152,7 @@ impl Remote {
         }
     }
 
-    /// What to do after this answer to frame `next`, sent for the caller's frame `number`.
+    /// How to recover from this problem with frame `next`, which was sent on the way to the caller's frame `number`.
     fn recovery(&self, problem: &Problem, next: u64, number: u64) -> Option<Recovery> {
         if is_gone(problem) {
             return Some(Recovery::Reopen);
@@ -162,9 +162,9 @@ impl Remote {
             Ordering::Less if self.kept.from(expected).is_some() => {
                 Some(Recovery::GoOnWith(expected))
             }
-            // A copy of the session that is older than its origin, such as another replica has.
+            // The service has a copy of the session from before the origin, as another replica may.
             Ordering::Less => Some(Recovery::Reopen),
-            // It has frames already that were sent again, the caller's perhaps among them.
+            // The service already has frames that were sent again, perhaps with the caller's.
             Ordering::Greater if next < number => Some(Recovery::GoOnWith(expected.min(number))),
             Ordering::Equal | Ordering::Greater => None,
         }
@@ -176,7 +176,7 @@ impl Remote {
             return Err(lost.into());
         };
         let created = match create(&mut self.transport, origin).await {
-            // Such as a service with other keys, which does not take the snapshot.
+            // For example a service with other keys, which refuses the snapshot.
             Err(ClientError::Refused(problem)) => {
                 lost.detail += &format!(" It could not be opened again: {problem}");
                 return Err(lost.into());
@@ -203,7 +203,7 @@ impl Remote {
                 Err(problem) if is_gone(&problem) => problem,
                 Err(problem) => return Err(problem.into()),
             };
-            // An answer that is lost is asked for at the next replica, which may not have the session.
+            // After a lost answer, the next replica is asked, which may not have the session: hence the pause.
             if !backoff.wait().await {
                 return Err(problem.into());
             }
@@ -215,14 +215,14 @@ impl Remote {
         let request = Request::bare(Method::DELETE, format!("/sessions/{}", self.id));
         match self.transport.call(&request).await?.checked() {
             Ok(_) => Ok(()),
-            // It has ended: by itself, or with an answer that got lost.
+            // The session has ended: it expired, or the answer to an earlier try got lost.
             Err(problem) if is_gone(&problem) => Ok(()),
             Err(problem) => Err(problem.into()),
         }
     }
 }
 
-/// Whether the service does not have the session any more.
+/// Whether the problem says that the service does not have the session any more.
 fn is_gone(problem: &Problem) -> bool {
     matches!(problem.status, 404 | 410)
 }
