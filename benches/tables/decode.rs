@@ -1,4 +1,4 @@
-//! Decoding files against a step.
+//! The time of decoding image files, compared with a step of the tracker.
 
 use std::hint::black_box;
 
@@ -16,8 +16,8 @@ fn read(file: &str) -> Vec<u8> {
     })
 }
 
-/// Prints two lines for each file, for a large target and for one of 24 x 24 pixels: its size, the working size,
-/// milliseconds to decode it to that, milliseconds of a step on it.
+/// Prints two lines for each file, for a large target and for one of 24 x 24 pixels: the size of the picture, the
+/// working size, milliseconds to decode the file to that, milliseconds of a step on it.
 pub fn print(files: &[&str]) {
     println!("file\twidth\theight\tworking_width\tworking_height\tdecode_ms\tstep_ms");
     for file in files {

@@ -1,4 +1,4 @@
-//! The time of a step by each size that it depends on, and of what comes before it by the size of the frame.
+//! The time of a step by each size that it depends on, and of the preparation of the frame by the frame's size.
 
 use std::hint::black_box;
 
@@ -9,7 +9,7 @@ use jpeg_encoder::{ColorType, Encoder};
 use crate::clock::Action;
 use crate::{clock, scene, warm};
 
-/// Both presets have work that comes every fifth or every tenth frame.
+/// Calls in a period: both presets have work that is done every fifth or every tenth frame.
 const PERIOD: usize = 10;
 const ROUNDS: usize = 25;
 
@@ -48,7 +48,7 @@ fn print_row(what: &str, size: &str, values: Vec<String>, times: &[f64]) {
     println!("| {what} | {size}: {values} | {} |", times.join(" · "));
 }
 
-/// Steps of a preset with one parameter at each of these values.
+/// Times steps of a preset with one parameter at each of these values.
 fn print_steps(preset: Preset, what: &str, (size, values, change): Size) {
     let with = |&value: &u32| {
         let mut params = preset.params();
@@ -69,7 +69,7 @@ fn print_steps(preset: Preset, what: &str, (size, values, change): Size) {
     print_row(what, size, values, &times);
 }
 
-/// What comes before a step grows with the pixels of the frame, the step does not.
+/// The preparation of the frame takes time in proportion to its pixels, the step does not.
 fn print_frame_sizes() {
     let mut sizes = [1, 2, 4, 6, 8].map(FrameSize::new);
     let limits = Limits::default();
@@ -80,7 +80,7 @@ fn print_frame_sizes() {
             black_box(bagtrack_ingest::decode(&size.jpeg, &limits)).expect("a whole JPEG");
         },
     );
-    // The smallest is the working image already: it is only copied.
+    // The smallest frame has the working size already, and is only copied.
     print_timed("copying and downscaling luma", &mut sizes[1..], |size| {
         black_box(frame(size.zoom, &size.luma));
     });
@@ -91,13 +91,13 @@ fn print_frame_sizes() {
     }
 }
 
-/// What frames of one size are timed with.
+/// The data to time frames of one size with.
 struct FrameSize {
     zoom: usize,
     jpeg: Vec<u8>,
     luma: Vec<u8>,
     seen: Frame,
-    /// Of both presets.
+    /// The trackers of both presets.
     trackers: [Tracker; 2],
 }
 
@@ -147,7 +147,7 @@ impl FrameSize {
     }
 }
 
-/// Times `work` at each of `sizes`, which take turns.
+/// Times `work` at each of `sizes`, in turns.
 fn print_timed(what: &str, sizes: &mut [FrameSize], work: impl Fn(&mut FrameSize)) {
     let labels = sizes
         .iter()

@@ -22,7 +22,7 @@ fn warm(params: Params) -> (Tracker, Vec<bagtrack_tracker::Frame>) {
 }
 
 fn main() {
-    // Cargo adds `--bench`.
+    // Cargo adds the argument `--bench`.
     let arguments: Vec<String> = std::env::args()
         .skip(1)
         .filter(|argument| argument != "--bench")
@@ -35,7 +35,7 @@ fn main() {
         ["decode", ref files @ ..] if !files.is_empty() => decode::print(files),
         ["memory", "paper", count] => memory::print(Preset::Paper, number(count)),
         ["memory", "robust", count] => memory::print(Preset::Robust, number(count)),
-        // `cargo bench` and `cargo test --benches` start it without a table.
+        // `cargo bench` and `cargo test --benches` start this program without naming a table.
         [] => ratios::print(),
         _ => {
             eprintln!("tables: ratios | growth | decode FILE... | state | memory PRESET COUNT");

@@ -10,17 +10,17 @@ use crate::{clock, scene, textbook, warm};
 
 const ROUNDS: usize = 300;
 
-/// Median seconds of each, measured in turns.
+/// Median seconds of each action, measured in turns.
 struct Times {
     step: f64,
     robust_step: f64,
-    /// Of the arithmetic of `paper`.
+    /// Seconds of the arithmetic of `paper`.
     evaluation: f64,
-    /// Of the same, as a textbook has it.
+    /// Seconds of the same arithmetic in the textbook version.
     textbook: f64,
-    /// Of one matrix product of the sizes in `shape`.
+    /// Seconds of one matrix product of the sizes in `shape`.
     product: f64,
-    /// Its columns, the length of a vector, and its rows.
+    /// The columns of the product, the length of a vector, and the rows.
     shape: [usize; 3],
 }
 
@@ -128,7 +128,7 @@ fn measure() -> Times {
     }
 }
 
-/// The feature vector of frame `t` of the scene where the target is, moved by `shift` to the right and half of it up.
+/// The feature vector of the target's box in frame `t`, moved by `shift` pixels to the right and half of that up.
 fn look(t: usize, shift: f64, params: &Params) -> Vec<f32> {
     let area = scene::target(t);
     let (x, y) = (area.x + shift, area.y - shift / 2.0);

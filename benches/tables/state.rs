@@ -1,4 +1,4 @@
-//! A tracker's state as bytes, and back.
+//! The time to save a tracker's state as bytes, and to restore it.
 
 use std::hint::black_box;
 
@@ -7,7 +7,7 @@ use bagtrack_tracker::{Preset, Tracker};
 use crate::{clock, scene, warm};
 
 const ROUNDS: usize = 300;
-/// How many frames the copy is behind beside which a state is restored.
+/// How many frames behind the copy is that a state is restored beside.
 const BEHIND: usize = 3;
 
 pub fn print() {
