@@ -1,4 +1,4 @@
-//! Sessions with the most expensive parameters, and as many frames in each request as are taken.
+//! Sessions with the most expensive parameters, and as many frames in each request as the service accepts.
 
 use crate::decode_bombs::flood;
 use crate::good::{GoodClients, frames};

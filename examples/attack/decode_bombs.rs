@@ -8,7 +8,7 @@ use reqwest::multipart::{Form, Part};
 use std::time::Instant;
 use tokio::task::JoinSet;
 
-/// A form with a picture so many times.
+/// A form with a picture, repeated `count` times.
 pub fn form(picture: &[u8], count: usize) -> Form {
     let part = || Part::bytes(picture.to_vec()).file_name("frame");
     (0..count).fold(Form::new(), |form, _| form.part("frame", part()))

@@ -11,9 +11,9 @@ use std::time::{Duration, Instant};
 use tokio::task::JoinSet;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
-/// From one frame of a client to its next.
+/// The time from one frame of a client to its next.
 pub const PERIOD: Duration = Duration::from_millis(40);
-/// After so long a frame counts as lost.
+/// The time after which a frame counts as lost.
 const LOST: Duration = Duration::from_secs(10);
 
 pub struct GoodClients {
@@ -21,24 +21,24 @@ pub struct GoodClients {
     clients: JoinSet<Outcome<Tally>>,
 }
 
-/// What came of their frames.
+/// What became of the frames of the good clients.
 #[derive(Debug)]
 pub struct Tally {
     pub answered: u64,
     /// Answers that were refusals, after which the frame was sent again.
     pub refused: u64,
     pub lost: u64,
-    /// What the first refusal said.
+    /// The text of the first refusal.
     pub why_refused: Option<String>,
     pub micros: Histogram<u64>,
 }
 
-/// The frames that are sent, of 320 x 240 pixels.
+/// The frames that good clients send, of 320 x 240 pixels.
 pub fn frames() -> Outcome<Vec<Vec<u8>>> {
     Ok(pictures::jpegs(1)?)
 }
 
-/// The box of the target in the first of them.
+/// The box of the target in the first frame.
 pub fn target_box() -> String {
     let target = pictures::target(1);
     format!(
@@ -68,7 +68,7 @@ impl GoodClients {
         Ok(Self { stop, clients })
     }
 
-    /// Waits for their last answers.
+    /// Stops the clients, and waits for their last answers.
     pub async fn stop(mut self) -> Outcome<Tally> {
         self.stop.store(true, Ordering::Relaxed);
         let mut all = Tally::new()?;
@@ -124,7 +124,7 @@ impl std::fmt::Display for Tally {
     }
 }
 
-/// Why a request has no answer of 200; none where it has.
+/// Why a request was not answered with 200; `None` if it was.
 async fn refusal(request: reqwest::RequestBuilder) -> Option<String> {
     let answer = match request.send().await {
         Ok(answer) if answer.status() == StatusCode::OK => return None,

@@ -34,7 +34,7 @@ pub async fn attack(target: &Target, options: &Options) -> Outcome<Verdict> {
         let connection = TcpStream::connect(target.address).await?;
         let (mut stream, _) = client_async(request, connection).await?;
         stream.next().await.ok_or("no greeting")??;
-        // As much as one message may have, and no image.
+        // A message of the largest size, which is no image.
         stream.send(Message::binary(vec![0; 12 << 20])).await?;
         stream.next().await.ok_or("no answer")??;
         streams.push(stream);
@@ -53,7 +53,7 @@ pub async fn attack(target: &Target, options: &Options) -> Outcome<Verdict> {
         "{STREAMS} streams after a message of 12 MiB each, readyz {}, {resident} MiB resident now, {memory}",
         ready.status()
     );
-    // They would keep 720 MiB.
+    // Without the limit, these streams would keep 720 MiB.
     let holds = kept && ready.status().is_success() && (!target.is_own() || resident < 400);
     good.verdict(holds, seen).await
 }

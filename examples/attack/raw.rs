@@ -1,4 +1,4 @@
-//! A connection that says what it likes.
+//! A raw connection, which sends arbitrary bytes.
 
 use crate::Outcome;
 use std::net::SocketAddr;
@@ -14,7 +14,7 @@ pub async fn send(address: SocketAddr, bytes: impl AsRef<[u8]>) -> Outcome<TcpSt
     Ok(stream)
 }
 
-/// What comes until the end of the connection or of a pause of `patience`.
+/// The bytes that come until the connection ends, or nothing comes for `patience`.
 pub async fn read(stream: &mut TcpStream, patience: Duration) -> String {
     let mut bytes = Vec::new();
     while let Ok(Ok(1..)) = timeout(patience, stream.read_buf(&mut bytes)).await {}

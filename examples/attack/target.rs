@@ -1,4 +1,4 @@
-//! The server that is attacked.
+//! The attacked server.
 
 use crate::good::target_box;
 use crate::{Options, Outcome};
@@ -17,7 +17,7 @@ pub struct Target {
     pub address: SocketAddr,
     pub http: Client,
     program: Option<Program>,
-    /// Bytes of resident memory that it said it stays below.
+    /// The announced limit of the server's resident memory, in bytes.
     pub bound: Option<u64>,
 }
 
@@ -68,7 +68,7 @@ impl Target {
         })
     }
 
-    /// The same server, which somebody else ends.
+    /// Another handle of the same server, which does not end it when dropped.
     pub fn same(&self) -> Self {
         Self {
             url: self.url.clone(),
@@ -85,7 +85,7 @@ impl Target {
         request.header("x-forwarded-for", client)
     }
 
-    /// Opens a session of this client; gives its path.
+    /// Opens a session of this client. Returns the session's path.
     pub async fn open(&self, client: &str, frame: &[u8], query: &str) -> Outcome<String> {
         let query = format!("box={}{query}", target_box());
         self.open_with(client, frame, &query).await

@@ -84,7 +84,7 @@ impl ChurningClient {
         let mut due = interval(self.every);
         due.set_missed_tick_behavior(MissedTickBehavior::Delay);
         while Instant::now() < end {
-            // A connection for each session, as clients have it that come and go.
+            // A new connection for each session, as with clients that come and go.
             let mut session = self.driver.session(&self.driver.client(1)?).await?;
             let life = 20 + (37 * opened + 61 * number) % 180;
             opened += 1;
@@ -103,7 +103,7 @@ impl ChurningClient {
                     break;
                 }
             }
-            // Every fifth client just goes away.
+            // Every fifth client goes away without ending its session.
             if !(opened + number).is_multiple_of(5) {
                 session.end().await?;
             }

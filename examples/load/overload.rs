@@ -23,7 +23,7 @@ const WARM_UP: Duration = Duration::from_secs(2);
 
 /// What became of the frames.
 struct Answers {
-    /// Of those that were answered, in microseconds.
+    /// Latencies of the answered frames, in microseconds.
     latencies: Histogram<u64>,
     refused: u64,
     /// Refusals that do not say when to try again.
@@ -149,7 +149,7 @@ impl Camera {
     async fn run(self, begin: Instant, length: Duration) -> Outcome<Answers> {
         let mut answers = Answers::new()?;
         let every = Duration::from_secs_f64(1.0 / RATE);
-        // They do not all send at the same moment.
+        // The cameras begin at different moments.
         let mut due = begin + every.mul_f64(f64::from(self.number) * 0.618 % 1.0);
         let mut pictures = self.driver.pictures.iter().cycle().skip(1);
         while due < begin + length {

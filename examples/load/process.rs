@@ -32,7 +32,7 @@ impl Server {
         Ok(Self(program))
     }
 
-    /// Gives it a lower priority than that of this process, whose work would be that of other machines.
+    /// Gives the server a lower priority than this process, whose clients would run on other machines.
     pub fn lower_priority(&self) -> Outcome<()> {
         for task in fs::read_dir(format!("/proc/{}/task", self.0.process_id()))? {
             let task = task?.file_name().to_string_lossy().parse()?;
@@ -46,7 +46,7 @@ impl Server {
         self.0.url("")
     }
 
-    /// Seconds of processor time that it has used.
+    /// Seconds of processor time that the server has used.
     pub fn cpu_seconds(&self) -> f64 {
         cpu_time::of_process(self.0.process_id())
     }
