@@ -1,4 +1,4 @@
-//! Image files: what is taken has the size that its header says, and keeps the limits.
+//! Image files: an accepted image has the size in its header, and keeps the limits.
 #![no_main]
 
 use bagtrack_ingest::{decode_to, inspect, recycle, Limits};
@@ -10,7 +10,7 @@ use std::sync::Once;
 static HOOK: Once = Once::new();
 
 fuzz_target!(|data: &[u8]| {
-    // libFuzzer's hook aborts at every panic; those of a decoder are caught, and the file is refused.
+    // Replaces libFuzzer's hook, which aborts at every panic: those of decoders are caught, and the file is refused.
     HOOK.call_once(|| std::panic::set_hook(Box::new(|panic| eprintln!("{panic}"))));
     let limits = Limits {
         max_side: 1024,

@@ -6,7 +6,7 @@ use std::io::Cursor;
 pub const WIDTH: u32 = 48;
 pub const HEIGHT: u32 = 36;
 
-/// Picture `t` in any size, as PNG.
+/// Picture `t` in this size, as PNG.
 pub fn pattern(t: u32, width: u32, height: u32) -> Vec<u8> {
     encode(t, width, height, ImageFormat::Png)
 }

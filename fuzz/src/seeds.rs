@@ -1,4 +1,4 @@
-//! Writes the first inputs of the targets to `FOLDER/TARGET/`: `seeds FOLDER`.
+//! Writes the seeds, the first inputs of the fuzz targets, to `FOLDER/TARGET/`: `seeds FOLDER`.
 
 use axum::http::Method;
 use bagtrack_fuzz::{content_of, jpeg, png, webp, Answer, Service, Shelf, Stored, BOX, SETTINGS};
@@ -10,7 +10,7 @@ use std::fs;
 use std::io;
 use std::path::PathBuf;
 
-/// Where the inputs go.
+/// The folder that the inputs are written to.
 struct Seeds(PathBuf);
 
 impl Seeds {
@@ -130,7 +130,7 @@ fn form(picture: &[u8]) -> Vec<u8> {
     [&form, &head[..], picture, b"\r\n--B--\r\n"].concat()
 }
 
-/// An answer that is success.
+/// The body of an answer, which must be success.
 fn sent(answer: Answer) -> io::Result<Answer> {
     match answer.status.is_success() {
         true => Ok(answer),

@@ -1,4 +1,4 @@
-//! The service, and what must hold for each of its answers.
+//! The service, and the checks of each of its answers.
 
 use axum::body::{Body, Bytes};
 use axum::http::{HeaderMap, Method, Request, StatusCode};
@@ -29,7 +29,7 @@ const REQUESTS_BETWEEN_UPKEEP: u32 = 1000;
 pub struct Service {
     runtime: Runtime,
     router: Router,
-    /// Whether it may say that what the store has cannot be read.
+    /// Whether the service may answer that a record of the store cannot be read.
     has_store: bool,
     requests: Cell<u32>,
 }
@@ -53,14 +53,14 @@ impl Answer {
 }
 
 impl Service {
-    /// Without a store. A panic that the service answers with an error counts as that answer.
+    /// A service without a store. A panic that the service turns into an answer counts as that answer.
     pub fn new() -> Self {
-        // libFuzzer's hook aborts at every panic, those of a decoder too, which the service catches.
+        // Replaces libFuzzer's hook, which aborts at every panic, also at those of decoders, which the service catches.
         std::panic::set_hook(Box::new(|panic| eprintln!("{panic}")));
         Self::on(new_runtime(), None)
     }
 
-    /// With this store. Every panic is a finding.
+    /// A service with this store. Every panic is a finding.
     pub fn with_store<S: SessionStore + Clone + 'static>(
         store: impl Future<Output = S>,
     ) -> (Self, S) {
@@ -76,7 +76,7 @@ impl Service {
                 clock: Clock::default(),
                 store,
                 expert: None,
-                // On this thread, so that the same input does the same.
+                // Work runs on this thread, so that the same input has the same effect.
                 executor: Executor::on_one_thread(|work| {
                     tokio::spawn(async move { work()() });
                 }),
@@ -93,7 +93,7 @@ impl Service {
         }
     }
 
-    /// Waits for something in the service's runtime.
+    /// Runs a future to its end in the service's runtime.
     pub fn wait<T>(&self, what: impl Future<Output = T>) -> T {
         self.runtime.block_on(what)
     }
@@ -174,7 +174,7 @@ impl Service {
         self.delete(&session);
     }
 
-    /// How many frames a session has taken; none if there is no such session.
+    /// How many frames a session has taken; `None` if there is no such session.
     pub fn frames(&self, session: &str) -> Option<u64> {
         let view = self.send((Method::GET, session), "text/plain", b"");
         match view.status {
@@ -195,7 +195,7 @@ impl Default for Service {
     }
 }
 
-/// With small limits, so that inputs are small too.
+/// Settings with small limits, so that inputs can be small, too.
 fn config() -> Config {
     let mut config = Config {
         workers: Some(1),
@@ -205,7 +205,7 @@ fn config() -> Config {
         max_frame_pixels: 1 << 20,
         max_frame_memory: 32 << 20,
         max_frames: 4,
-        // A sanitizer makes work slow.
+        // Long times, since a sanitizer makes work slow.
         work_timeout: Duration::from_secs(600),
         ..Config::default()
     };
@@ -226,12 +226,12 @@ fn new_runtime() -> Runtime {
 /// Bytes of the length of a state's content, which come before it.
 const LENGTH_BYTES: usize = 4;
 
-/// The version of a snapshot, and what it holds, uncompressed.
+/// The version and the uncompressed content of a snapshot.
 pub fn content_of(snapshot: &[u8]) -> io::Result<(u8, Vec<u8>)> {
     content_of_stored(&snapshot[..snapshot.len() - MAC_BYTES])
 }
 
-/// The version of a stored state, and what it holds, uncompressed.
+/// The version and the uncompressed content of a stored state.
 pub fn content_of_stored(state: &[u8]) -> io::Result<(u8, Vec<u8>)> {
     let version = SNAPSHOT_MAGIC.len();
     let compressed = &state[version + 1 + LENGTH_BYTES..];

@@ -1,4 +1,4 @@
-//! A store that has one record, whatever its bytes are: of a Redis, or of a folder.
+//! A store with one record of arbitrary bytes, like one in a Redis or in a folder.
 
 use crate::service::{content_of_stored, stored_of};
 use bagtrack_sessions::{
@@ -12,15 +12,15 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 use uuid::Uuid;
 
-/// How long calls to it may take, and sessions in it live.
+/// The time limit of calls to the store, and the life of sessions in it.
 const LONG: Duration = Duration::from_secs(3600);
-/// Most stored answers that are read.
+/// Most stored answers that the store reads.
 pub const MAX_RECENT: usize = 4;
 
-/// What the store has.
+/// The record in the store.
 #[derive(Debug, Clone)]
 pub enum Stored {
-    /// What a Redis answers: milliseconds to live, then the fields of the record.
+    /// The answer of a Redis: milliseconds to live, then the fields of the record.
     Redis {
         ttl: i64,
         generation: Vec<u8>,
@@ -28,7 +28,7 @@ pub enum Stored {
         head: Vec<u8>,
         state: Vec<u8>,
     },
-    /// What the tables of a folder have.
+    /// The rows in the tables of a folder.
     Folder { row: Vec<u8>, state: Vec<u8> },
 }
 
@@ -104,14 +104,14 @@ impl Stored {
 #[derive(Debug, Clone)]
 pub struct Shelf {
     stored: Place,
-    /// The records that were created, and those that followed them.
+    /// The records that were created, and their later versions.
     written: Arc<Mutex<Vec<Record>>>,
     redis: RedisStore,
 }
 
 type Place = Arc<Mutex<Option<Stored>>>;
 
-/// In place of a Redis.
+/// Answers in place of a Redis.
 #[derive(Debug)]
 struct Server(Place);
 
@@ -156,17 +156,17 @@ impl Shelf {
         }
     }
 
-    /// From now on it has this.
+    /// Replaces the record.
     pub fn put(&self, stored: Option<Stored>) {
         *lock(&self.stored) = stored;
     }
 
-    /// The records that were written since this was last asked, oldest first.
+    /// The records that were written since the last call, oldest first.
     pub fn take_written(&self) -> Vec<Record> {
         std::mem::take(&mut *lock(&self.written))
     }
 
-    /// What it has, as a service gets it.
+    /// The record, as a service reads it.
     pub async fn record(&self, id: Uuid) -> Result<Option<Record>, StoreUnavailable> {
         let stored = lock(&self.stored).clone();
         match stored {
@@ -200,7 +200,7 @@ impl SessionStore for Shelf {
         Box::pin(self.record(id))
     }
 
-    /// What the service writes, it reads.
+    /// Checks that the service can read the records that it writes.
     fn commit(&self, commit: Commit) -> StoreFuture<'_, Outcome> {
         Box::pin(async move {
             if let Some(state) = commit.state {
