@@ -1,9 +1,8 @@
 //! What the programs `bagtrack` and `bagtrack-eval` have in common on the command line.
 //!
 //! [`ParamFlags`] choose the tracker's parameters (`--preset`, `--set NAME=VALUE`), [`ModelFlag`] the network of a
-//! second opinion (`--model`), [`progress`] draws bars on standard error, and [`output`] writes new folders and
-//! standard output. [`frames`] lists the frames of a folder, and [`read_boxes`] reads its annotations in the OTB
-//! layout.
+//! second opinion (`--model`), and [`output`] writes new folders and standard output, and draws bars on standard error.
+//! [`frames`] lists the frames of a folder, and [`read_boxes`] reads its annotations in the OTB layout.
 
 mod assignment;
 mod boxes;
