@@ -2,9 +2,9 @@
 //!
 //! In: requests, problems, and the work on frames. Out: `GET /metrics`, in the text format.
 //!
-//! Each [`Metrics`] has a recorder of its own rather than the process's, so that services in one
-//! process do not mix. Handles are made once; a request with a route and a status that were not seen before makes new
-//! ones. Labels are routes, methods, statuses and kinds of problems: there are few of each, whatever clients send.
+//! Each [`Metrics`] has a recorder of its own, not the process's, so that several services in one process do not mix.
+//! Handles are made at the start; those of requests and problems are looked up by their labels. Labels are routes,
+//! methods, statuses and kinds of problems: few of each, whatever clients send.
 //!
 //! What can go wrong: nobody asks for `/metrics`, and measurements pile up. So the sweeper sums them up from time to
 //! time ([`Metrics::upkeep`]).
@@ -14,11 +14,11 @@ use bagtrack_sessions::TrackingMetrics;
 use metrics::{Counter, Gauge, Histogram, Key, KeyName, Label, Level, Metadata, Recorder, Unit};
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusRecorder};
 
-/// Bounds in seconds for requests and for waiting.
+/// Upper bounds of the histograms' buckets, in seconds, for requests and for waiting.
 const REQUEST_SECONDS: [f64; 14] = [
     0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0,
 ];
-/// Bounds in seconds for the work on one frame.
+/// Upper bounds of the histograms' buckets, in seconds, for the work on one frame.
 const FRAME_SECONDS: [f64; 12] = [
     0.00025, 0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064, 0.128, 0.256, 1.0,
 ];
@@ -29,7 +29,7 @@ const PROBLEMS: &str = "bagtrack_problems_total";
 
 pub struct Metrics {
     recorder: PrometheusRecorder,
-    /// Time from the place in the queue to the worker.
+    /// Seconds that a request waited for its session and for a worker.
     pub queue_wait: Histogram,
     /// Bytes of request bodies.
     pub received_bytes: Counter,
@@ -100,12 +100,12 @@ impl Metrics {
             .increment(1);
     }
 
-    /// A value of this moment.
+    /// Sets a gauge.
     pub fn set(&self, name: &'static str, description: &'static str, value: f64) {
         Maker(&self.recorder).gauge(name, description).set(value);
     }
 
-    /// How many calls of a store failed.
+    /// Sets the counter of failed calls of the store.
     pub fn store_failures(&self, failures: u64) {
         let failed = Maker(&self.recorder).counter(
             "bagtrack_store_failures_total",

@@ -4,10 +4,9 @@
 //! router, into an extractor that reads its upload, into its handler, which works on a session with a worker thread,
 //! and back.
 //!
-//! What can go wrong: clients send headers or bodies slowly, or too much of them; bytes are not an image; there is more
-//! work than there are cores; a connection breaks after a frame was taken; a client has no key. [`Application`] bounds
-//! the first, [`Config`] names every bound, numbered frames can be sent again, [`ApiKeys`] say who may call, and the
-//! cause of an error is in the log only.
+//! What can go wrong: clients send headers or bodies slowly, or too much of them, or more work than the cores can do
+//! ([`Config`] names a bound for each); a connection breaks after a frame was taken (a numbered frame can be sent
+//! again); a client has no key ([`ApiKeys`] say who may call). The cause of an error is in the log only.
 //!
 //! ```no_run
 //! # async fn example() -> Result<(), Box<dyn std::error::Error>> {

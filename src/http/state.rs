@@ -1,6 +1,6 @@
 //! What all handlers share.
 //!
-//! In: the settings, the keys, the clock and the store. Out: an [`AppState`], whose clones are the same.
+//! In: the settings, the keys, the clock and the store. Out: an [`AppState`], whose clones share one state.
 
 use crate::http::metrics::Metrics;
 use axum::body::Bytes;
@@ -17,7 +17,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::SystemTime;
 
-/// What all handlers share; clones are the same state.
+/// What all handlers share. Clones share one state.
 #[derive(Debug, Clone)]
 pub struct AppState(Arc<Shared>);
 
@@ -26,15 +26,15 @@ pub struct AppState(Arc<Shared>);
 pub struct Shared {
     /// The settings, validated.
     pub config: Config,
-    /// The one door to sessions.
+    /// All acts on sessions go through this.
     pub service: SessionService,
-    /// The memory of all uploads together.
+    /// The memory budget of all uploads, and of answers that their clients have not taken, in bytes.
     pub uploads: Budget,
-    /// What each client has in use.
+    /// The quotas of each client, and what it uses of them.
     pub clients: Clients,
     pub access: Access,
     pub metrics: Metrics,
-    /// The text of `/metrics` that was rendered last, and when that began.
+    /// The last text of `/metrics`, and when its rendering began.
     pub rendered_metrics: tokio::sync::Mutex<Option<(Instant, Bytes)>>,
     /// Places for the processes that decode videos.
     pub videos: VideoPlaces,
@@ -52,16 +52,16 @@ impl std::ops::Deref for AppState {
     }
 }
 
-/// What a service is made of, beside its settings.
+/// The parts of a service, beside its settings.
 #[derive(Debug)]
 pub struct Parts {
-    /// What sessions expire by.
+    /// The clock by which sessions expire.
     pub clock: Clock,
-    /// What keeps them. The store that the settings name is not looked at.
+    /// The store of the sessions; `None` keeps them in memory only. The store that the settings name is ignored.
     pub store: Option<Arc<dyn SessionStore>>,
-    /// What gives a second opinion in every session. The network that the settings name is not looked at.
+    /// The expert that gives a second opinion in every session. The network that the settings name is ignored.
     pub expert: Option<Arc<dyn Expert>>,
-    /// What decodes and tracks.
+    /// Runs the work on frames: decoding and tracking.
     pub executor: Executor,
 }
 
@@ -101,7 +101,7 @@ impl AppState {
             access,
             metrics,
             rendered_metrics: tokio::sync::Mutex::default(),
-            // A client has one at a time, and no client all of them.
+            // There are at least two, and a client's account takes one at a time: no client has all.
             videos: VideoPlaces::new(config.video_places()),
             queue_saturation: Saturation::default(),
             upload_saturation: Saturation::default(),
@@ -119,17 +119,17 @@ impl AppState {
         self.clock.wall(self.clock.now())
     }
 
-    /// Memory for a client's upload or answer: none so far.
+    /// A charge for the memory of a client's upload or answer; 0 bytes so far.
     pub fn charge(&self, client: &Client) -> Charge {
         Charge::new(&self.uploads, self.clients.account(client).bytes())
     }
 
-    /// In whose turn the work of a client is done.
+    /// The flow in whose turns the client's work is done.
     pub fn flow(&self, client: &Client) -> Flow {
         self.clients.account(client).flow()
     }
 
-    /// Sets the metrics that are values of a moment.
+    /// Sets the metrics that are read off when `/metrics` is rendered.
     pub fn measure(&self) {
         let (config, admission) = (&self.config, &self.service.admission);
         let workers = config.worker_count();
@@ -225,14 +225,15 @@ fn registry(config: &Config, clock: &Clock, has_store: bool) -> Registry {
     }
 }
 
-/// Whether something was found full. It counts as full until half of it is free, so that the answer does not flicker.
+/// Whether a number of places counts as full: from when at most a tenth of them is free until at least half of them is,
+/// so that the answer does not flicker.
 #[derive(Debug, Default)]
 pub struct Saturation(AtomicBool);
 
 impl Saturation {
-    /// Whether it counts as full, now that `free` of its `all` places are free.
+    /// Notes that `free` of `all` places are free. Returns whether they count as full.
     pub fn update(&self, free: usize, all: usize) -> bool {
-        // A tenth of the places, and half of them.
+
         let (fills, empties) = (free <= all / 10, free * 2 >= all);
         let before = self.0.load(Ordering::Relaxed);
         let now = if before { !empties } else { fills };

@@ -1,4 +1,4 @@
-//! Listening, and ending.
+//! The service at its address: it listens, serves and ends.
 //!
 //! On shutdown, busy connections get a bounded time to end. Each reason why the service cannot start names the setting
 //! to change.
@@ -26,7 +26,7 @@ use std::time::SystemTime;
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 
-/// Bytes of an answer that the system takes while it waits to send them. With more, a client that reads slowly but
+/// Most bytes of an answer that the system buffers before it sends them. With more, a client that reads slowly but
 /// steadily would for a long time seem to take nothing.
 #[cfg(target_os = "linux")]
 const MAX_UNSENT: u32 = 64 << 10;
@@ -55,7 +55,7 @@ pub enum BindError {
     /// The keys cannot be used, or the service would be open to a network.
     #[error(transparent)]
     Access(#[from] AccessError),
-    /// There is no certificate to show, where the settings name one.
+    /// The certificate that the settings name cannot be used.
     #[cfg(feature = "tls")]
     #[error(transparent)]
     Certificate(#[from] CertificateError),
@@ -64,7 +64,7 @@ pub enum BindError {
     Listen {
         /// The address.
         address: SocketAddr,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// The folder of the store cannot be used.
@@ -132,7 +132,7 @@ impl Application {
     /// The address that the service listens on.
     ///
     /// # Errors
-    /// What the system says.
+    /// The system does not tell the address.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
         self.listener.local_addr()
     }
@@ -142,7 +142,7 @@ impl Application {
         self.security.scheme()
     }
 
-    /// What reads the certificate again, where there is one. It may block.
+    /// A function that reads the certificate again, and may block; `None` without TLS.
     #[cfg(feature = "tls")]
     pub fn certificate(
         &self,
@@ -154,13 +154,13 @@ impl Application {
         Some(move || certificate.reload(state.now()))
     }
 
-    /// The API keys, to read them again.
+    /// The API keys of the service, shared with it, to read them again.
     pub fn api_keys(&self) -> ApiKeys {
         self.service.state.access.keys.clone()
     }
 
-    /// What reads the keys of the issuer of tokens again, where one is named. It gives how many there are, and may
-    /// block.
+    /// A function that reads the keys of the issuer of tokens again, and may block. It returns their number. `None`
+    /// where the settings name no issuer.
     #[cfg(feature = "jwt")]
     pub fn issuer_keys(
         &self,
@@ -170,8 +170,8 @@ impl Application {
         Some(move || verifier.reload(state.now()))
     }
 
-    /// Serves these routes too: behind the middleware that all requests pass, but not behind those that ask for a key,
-    /// or check the origin and the host.
+    /// Serves these routes too. Their requests pass through the middleware of all requests, but no check of a key, of
+    /// the origin or of the host.
     pub fn with_routes(mut self, routes: Router) -> Self {
         self.extra = self.extra.merge(routes);
         self
@@ -222,7 +222,7 @@ impl Application {
         drop(listener);
         sweeper.abort();
         ending.send_replace(true);
-        // Each connection, and each stream that took one over, holds a receiver.
+        // Each connection, and each stream that took one over, holds a receiver of `ending`.
         let ended = timeout(config.shutdown_timeout, ending.closed()).await;
         drop(keep_alive);
         service.flush().await;
@@ -230,7 +230,7 @@ impl Application {
     }
 }
 
-/// Listens. The sockets that it accepts have its options.
+/// Listens. Accepted sockets inherit the options of the listener.
 async fn listen(address: SocketAddr) -> io::Result<TcpListener> {
     let listener = TcpListener::bind(address).await?;
     #[cfg(target_os = "linux")]
@@ -238,15 +238,15 @@ async fn listen(address: SocketAddr) -> io::Result<TcpListener> {
     Ok(listener)
 }
 
-/// Reads the keys. They may come from a slow file system, or over the network.
+/// Reads the keys on a thread that may block: they may come from a slow file system, or over the network.
 async fn load_access(config: &Config, now: SystemTime) -> Result<Access, AccessError> {
     let (access, listen) = (config.access.clone(), config.listen);
     let loaded = tokio::task::spawn_blocking(move || Access::load(&access, listen, now)).await;
-    // Nobody cancels it.
+    // Nobody cancels the task, so it can only have panicked.
     loaded.unwrap_or_else(|panic| std::panic::resume_unwind(panic.into_panic()))
 }
 
-/// With TLS where the settings name a certificate.
+/// TLS where the settings name a certificate, else plain TCP.
 #[cfg(feature = "tls")]
 fn security(tls: &TlsConfig, now: SystemTime) -> Result<Security, CertificateError> {
     let certificate = Certificate::load(tls.tls_cert.as_deref(), tls.tls_key.as_deref(), now)?;

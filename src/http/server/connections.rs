@@ -1,7 +1,7 @@
 //! Connections: accepted or refused, and what each goes through to its end.
 //!
 //! `axum::serve` has no time limit for request heads: a client that sends half a line holds its connection for ever.
-//! hyper's connection builder has one. Connections are [counted](Connections), too.
+//! hyper's connection builder has such a limit. Connections are [counted](Connections), too.
 
 use crate::http::metrics::Metrics;
 use crate::http::middleware::response_headers::{HEADERS, STRICT};
@@ -37,13 +37,13 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
 use tokio::task::yield_now;
 
-/// How long to wait before looking for room again.
+/// How long to wait after the system could not accept a connection.
 const RETRY: Duration = Duration::from_millis(100);
-/// Most connections for probes alone of one address.
+/// Most connections of one address that serve nothing but probes.
 const PROBE_CONNECTIONS_OF_ADDRESS: usize = 8;
 
-/// Accepts connections for ever. The first service has them, and the second one those over the share of their address.
-/// They end when `cut_off` loses its sender.
+/// Accepts connections for ever. The first service serves those within the share of their address, the second one those
+/// over it. Connections end when `cut_off` loses its sender.
 pub(super) async fn accept(
     listener: &TcpListener,
     state: &AppState,
@@ -92,21 +92,20 @@ pub(super) async fn accept(
     }
 }
 
-/// Tells a client that it has too many connections, as far as its system takes that at once. With TLS the connection is
-/// closed without a word: what is said before the handshake looks like a fault of the service.
+/// Tells a client that it has too many connections, and closes this one. The answer is written without waiting, so a
+/// part may be lost. With TLS nothing is written: plain text before the handshake looks like a fault of the service.
 fn refuse(stream: TcpStream, peer: SocketAddr, state: &AppState, has_tls: bool) {
     let problem = Problem::too_many_connections();
     let answer = refusal(&problem, peer.ip(), &state.metrics);
     if let Ok(mut stream) = stream.into_std()
         && !has_tls
     {
-        // It does not wait: the stream is not in blocking mode.
+        // The write does not wait: a stream of tokio is not in blocking mode.
         let _ = stream.write(&answer);
     }
 }
 
-/// The answer that ends a connection of this client with a problem, written before any request is read. Counts it, and
-/// writes its line in the log.
+/// The HTTP answer with a problem that ends a connection before any request is read. Counts the problem, and logs it.
 fn refusal(problem: &Problem, client: IpAddr, metrics: &Metrics) -> Vec<u8> {
     let id = new_id().to_string();
     metrics.problem(problem.kind());
@@ -133,7 +132,7 @@ fn refusal(problem: &Problem, client: IpAddr, metrics: &Metrics) -> Vec<u8> {
     [head.into_bytes(), body].concat()
 }
 
-/// How long a connection that is for probes alone may take to begin: others wait for its place.
+/// Most time for a TLS handshake or the head of a request on a connection for probes: others wait for its place.
 const PROBE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// How all connections of a service are served.
@@ -142,7 +141,7 @@ pub struct ConnectionService {
     state: AppState,
     security: Security,
     routes: Router,
-    /// For clients that speak plain HTTP where TLS is expected.
+    /// The routes for clients that speak plain HTTP where TLS is expected.
     #[cfg(feature = "tls")]
     https_only: Router,
     http: http1::Builder,
@@ -150,13 +149,13 @@ pub struct ConnectionService {
 }
 
 impl ConnectionService {
-    /// Of a service with these routes.
+    /// Serves connections with these routes.
     pub fn new(state: AppState, security: Security, routes: Router) -> Self {
         let begins_within = state.config.header_timeout;
         Self::beginning_within(begins_within, state, security, routes)
     }
 
-    /// For connections over the share of their address.
+    /// Serves nothing but probes, to connections over the share of their address.
     pub fn for_probes(state: AppState, security: Security) -> Self {
         let begins_within = state.config.header_timeout.min(PROBE_TIMEOUT);
         let routes = probes_only(&state);
@@ -212,7 +211,8 @@ impl ConnectionService {
         self.speak_http(transport, peer, routes.clone(), hold).await;
     }
 
-    /// Waits until the client at this address may make a handshake. A trusted proxy makes those of many.
+    /// Waits until the client at this address may make a TLS handshake. A trusted proxy does not wait: it makes the
+    /// handshakes of many clients.
     async fn handshake_turn(&self, peer: SocketAddr) {
         let trusted = &self.state.config.limits.trusted_proxies;
         if !is_trusted(peer.ip().to_canonical(), trusted) {
@@ -221,7 +221,7 @@ impl ConnectionService {
         }
     }
 
-    /// Serves HTTP over these bytes until they end, or a stream that has taken them over does.
+    /// Serves HTTP over this transport until the connection ends, or a stream has taken it over.
     pub async fn serve_http(&self, transport: Transport, peer: SocketAddr, hold: ConnectionHold) {
         let routes = self.routes.clone();
         self.speak_http(transport, peer, routes, hold).await;
@@ -251,7 +251,7 @@ impl ConnectionService {
             request.extensions_mut().insert(connection.clone());
             let answer = service.call(request);
             async move {
-                // hyper goes on with the next of the requests that came at once, up to 16 of them.
+                // hyper would answer up to 16 pipelined requests without a break for other tasks.
                 yield_now().await;
                 answer.await.map(|answer| activity.answer(answer))
             }

@@ -39,9 +39,9 @@ pub fn router(state: AppState, extra: Router) -> Router {
     mount(&state.config.base_path, with_layers(routes, &state))
 }
 
-/// What is served to an address that has no connection left: probes, since a supervisor ends a service that does not
-/// answer them. Whoever asks for something else is told why. Each connection has one answer, so nobody keeps the
-/// places.
+/// The routes for connections over the share of their address: the probes, since a supervisor ends a service that does
+/// not answer them. Other requests get [`Problem::too_many_connections`]. A connection closes after one answer, so that
+/// no client keeps its place.
 pub fn probes_only(state: &AppState) -> Router {
     let (probes, _) = routes::probes().split_for_parts();
     let refuse = async || Problem::too_many_connections();
@@ -51,7 +51,7 @@ pub fn probes_only(state: &AppState) -> Router {
     mount(&state.config.base_path, with_layers(routes, state))
 }
 
-/// What is served where TLS is expected, and is not spoken.
+/// The routes for requests in plain HTTP where TLS is expected.
 #[cfg(feature = "tls")]
 pub fn https_only(state: &AppState) -> Router {
     with_layers(Router::new().fallback(to_https), state)
@@ -67,8 +67,8 @@ fn with_layers(routes: Router, state: &AppState) -> Router {
     ))
 }
 
-/// The routes of the service, each behind the checks of who may use it, but for probes: they have no key, and name the
-/// machine by its address.
+/// The routes of the service, each behind the checks of who may use it. Only the probes are behind none: they have no
+/// key, and their `Host` is the address of the machine.
 fn routes(state: &AppState) -> Router<AppState> {
     let of_page = middleware::from_fn_with_state(state.clone(), page_request);
     let of_sessions = middleware::from_fn_with_state(state.clone(), session_request);
@@ -103,8 +103,8 @@ fn routes(state: &AppState) -> Router<AppState> {
         .merge(probes)
 }
 
-/// Sends those who read to the same path over TLS. Others have sent what they want done, perhaps with their key, over a
-/// line that anybody can read: they are told so, and nothing is done.
+/// Redirects GET and HEAD to the same path over TLS. Other requests are refused: the client has sent data, perhaps with
+/// its key, over a line that anybody can read, and has to learn of that.
 #[cfg(feature = "tls")]
 async fn to_https(request: Request) -> Response {
     let host = request.headers().get(HOST);
@@ -112,7 +112,7 @@ async fn to_https(request: Request) -> Response {
     let path = request.uri().path_and_query();
     let path = path.map_or("/", |path| path.as_str());
     match (request.method(), host) {
-        // It may be another service that listens here tomorrow: a browser is not to remember this.
+        // Temporary, so that browsers do not remember the redirect: another service may listen here one day.
         (&Method::GET | &Method::HEAD, Some(host)) if !host.is_empty() => {
             Redirect::temporary(&format!("https://{host}{path}")).into_response()
         }

@@ -1,4 +1,4 @@
-//! The service without a network: its routes, and what goes on beside requests.
+//! The service without a network: its routes, and its work in the background.
 
 use super::application::BindError;
 use super::connections::ConnectionService;
@@ -13,7 +13,7 @@ use bagtrack_sessions::clock::interval;
 use std::net::SocketAddr;
 use std::time::Duration;
 
-/// The service, which listens nowhere: for simulations, which bring its requests themselves. Clones are the same.
+/// The service without a listener, for simulations that bring the requests themselves. Clones share one state.
 #[derive(Debug, Clone)]
 pub struct Service {
     pub(super) state: AppState,
@@ -34,7 +34,7 @@ impl Service {
         Ok(Self::of(config, access, parts))
     }
 
-    /// The same, with settings and keys that were checked.
+    /// Like [`Self::new`], with settings and keys that were checked.
     pub(super) fn of(config: Config, access: Access, parts: Parts) -> Self {
         Self {
             state: AppState::new(config, access, parts),
@@ -46,13 +46,13 @@ impl Service {
         self.routes(Router::new()).layer(Extension(Peer(client)))
     }
 
-    /// What serves connections that are brought to it.
+    /// Serves connections without TLS that the caller has accepted.
     pub fn connections(&self) -> ConnectionService {
         let routes = self.routes(Router::new());
         ConnectionService::new(self.state.clone(), Security::Plain, routes)
     }
 
-    /// The routes, beside these.
+    /// The routes of the service, with those of `extra` beside them.
     pub(super) fn routes(&self, extra: Router) -> Router {
         router(self.state.clone(), extra)
     }
@@ -62,12 +62,12 @@ impl Service {
         self.state.service.drain();
     }
 
-    /// Writes to the store what only this process has of its sessions.
+    /// Writes to the store the states of sessions that only this process has.
     pub async fn flush(&self) {
         self.state.service.flush().await;
     }
 
-    /// Ends expired sessions, again and again.
+    /// Ends expired sessions at intervals, for ever.
     pub async fn sweep(&self) {
         let state = &self.state;
         let idle = state.config.session_idle;
