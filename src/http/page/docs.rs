@@ -14,11 +14,11 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 use utoipa_swagger_ui::Config;
 
-// The default validator is on another host.
+// Swagger UI's default validator would be on another host.
 static SWAGGER: LazyLock<Arc<Config<'static>>> =
     LazyLock::new(|| Arc::new(Config::new(["../openapi.json"]).validator_url("none")));
 
-/// The files of Swagger UI that were asked for.
+/// The files of Swagger UI that were asked for, by their paths.
 static FILES: Mutex<BTreeMap<String, Arc<StaticFile>>> = Mutex::new(BTreeMap::new());
 
 static PROBLEMS: LazyLock<Arc<StaticFile>> = LazyLock::new(|| {
@@ -37,7 +37,7 @@ pub async fn served(document: Arc<StaticFile>, headers: HeaderMap) -> Response {
     document.respond(&headers).await
 }
 
-/// `/docs`: the files of Swagger UI are relative to `/docs/`.
+/// Redirects `/docs` to `/docs/`, since the links of Swagger UI are relative to `/docs/`.
 pub async fn redirect() -> Redirect {
     Redirect::to("/docs/")
 }
@@ -61,9 +61,9 @@ pub async fn asset(
     Ok(file(&path)?.respond(&headers).await)
 }
 
-/// A file of Swagger UI. Those that there are not are not kept.
+/// A file of Swagger UI. A path without a file leaves no entry in [`FILES`], so that clients cannot fill the memory.
 fn file(path: &str) -> Result<Arc<StaticFile>, Problem> {
-    // Nothing panics while it is held.
+    // Nothing panics while the lock is held.
     let mut files = FILES.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(file) = files.get(path) {
         return Ok(file.clone());

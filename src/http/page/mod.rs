@@ -1,4 +1,4 @@
-//! The web page, the interactive documentation and the sample clips, all out of the binary.
+//! The web page, the interactive documentation and the sample clips: the program needs no files for them.
 
 pub mod docs;
 pub mod sample_clips;

@@ -1,8 +1,8 @@
 //! `/sample/{clip}/…`: the synthetic clips of the page, drawn when they are asked for.
 //!
-//! Each frame is drawn once, one at a time, and kept: what the clips cost is bounded however often they are asked for.
-//! The first one takes up to a second, since the wall behind is drawn with it: whoever opens the page may want it next,
-//! so it is drawn then.
+//! Each frame is drawn at its first request, one frame of a clip at a time, and kept: this bounds the cost of the clips
+//! however often they are asked for. A clip's first frame takes up to a second, since the background is drawn with it.
+//! So the first frames are drawn ahead when somebody opens the page.
 
 use crate::http::problems::problem::Problem;
 use crate::http::respond::body::Json;
@@ -20,7 +20,7 @@ use tokio::sync::Mutex;
 
 const FRAMES: u32 = 150;
 const SIZE: (u32, u32) = (480, 360);
-/// The clips do not change with the service.
+/// Browsers may keep the clips for an hour: they are always the same.
 const CACHED: &str = "public, max-age=3600";
 
 /// A clip and the files of its frames.
@@ -43,7 +43,7 @@ static CLIPS: LazyLock<[Drawn; 2]> = LazyLock::new(|| {
 pub struct ClipView {
     width: u32,
     height: u32,
-    /// For each frame `x, y, width, height` of the target, and the share of it that is seen.
+    /// For each frame `x, y, width, height` of the target in pixels, and the share of it that is seen, from 0 to 1.
     truth: Vec<[f64; 5]>,
 }
 
@@ -81,10 +81,10 @@ impl Drawn {
         Ok(frame.get_or_init(|| bytes.into()).clone())
     }
 
-    /// Draws the first frame. Who asks for it meanwhile waits for this one.
+    /// Draws the first frame. Requests for frames of this clip wait meanwhile.
     fn draw_first(&self) {
         let _drawing = self.drawing.blocking_lock();
-        // One that cannot be drawn is told to whoever asks for it.
+        // An error is dropped here: the next request for the frame draws again, and gets the error.
         if let Ok(bytes) = encode(&self.clip, 0) {
             self.frames[0].get_or_init(|| bytes.into());
         }
@@ -100,7 +100,7 @@ pub fn draw_ahead() {
     static BEGUN: Once = Once::new();
     BEGUN.call_once(|| {
         let draw = || CLIPS.iter().for_each(Drawn::draw_first);
-        // Without a thread they are drawn when they are asked for.
+        // Without the thread each frame is drawn at its first request.
         let _ = thread::Builder::new()
             .name("sample-clips".to_owned())
             .spawn(draw);

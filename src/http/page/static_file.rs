@@ -1,7 +1,7 @@
 //! Files that are part of the program, sent with gzip to clients that take it.
 //!
-//! Each is compressed once, when it is first asked for, so that no request costs the processor time of another. A tag
-//! tells whether a browser has the file already. It is a weak one, since both encodings have it.
+//! Each file is compressed once, when a client first takes it with gzip, and then kept. An entity tag tells whether a
+//! browser has the file already. The tag is weak, since the plain and the compressed file share it.
 
 use crate::http::extract::answer_form::{MAX_ITEMS, qualities};
 use axum::body::Bytes;
@@ -14,7 +14,7 @@ use axum::response::{IntoResponse, Response};
 use std::sync::{Arc, OnceLock};
 use zlib_rs::{DeflateConfig, ReturnCode, compress_bound, compress_slice};
 
-/// A window of 32 KiB, and a gzip header around it.
+/// The `window_bits` of zlib: 15 for a window of 32 KiB, and 16 for a gzip header and trailer.
 const GZIP: i32 = 15 + 16;
 /// Smaller files hardly shrink.
 const MIN_BYTES: usize = 1024;
@@ -70,7 +70,7 @@ impl StaticFile {
         }
     }
 
-    /// Whether the client has this file.
+    /// Whether `If-None-Match` names this file, so that the client has it already.
     fn is_known(&self, headers: &HeaderMap) -> bool {
         let values = headers.get_all(IF_NONE_MATCH).into_iter();
         let texts = values.filter_map(|value| value.to_str().ok());
@@ -86,7 +86,7 @@ impl StaticFile {
         }
         let file = self.clone();
         let compress = move || file.gzip.get_or_init(|| gzip(&file.bytes)).clone();
-        // It is sent as it is where the runtime is about to end.
+        // The task fails only where the runtime is about to end; the file is then sent uncompressed.
         tokio::task::spawn_blocking(compress).await.ok().flatten()
     }
 }
@@ -95,7 +95,7 @@ fn gzip(bytes: &[u8]) -> Option<Bytes> {
     if bytes.len() < MIN_BYTES {
         return None;
     }
-    // The bound is for another header, which is 12 bytes shorter.
+    // `compress_bound` has room for the 6 bytes of a zlib header and trailer; those of gzip have 18.
     let mut buffer = vec![0; compress_bound(bytes.len()) + 12];
     let config = DeflateConfig {
         window_bits: GZIP,
@@ -107,7 +107,7 @@ fn gzip(bytes: &[u8]) -> Option<Bytes> {
     is_smaller.then(|| Bytes::copy_from_slice(&buffer[..length]))
 }
 
-/// Whether the client takes gzip: it is named, or all encodings are, with a quality above 0.
+/// Whether `Accept-Encoding` names gzip, or else `*`, with a quality above 0.
 fn takes_gzip(headers: &HeaderMap) -> bool {
     let named: Vec<_> = qualities(headers, ACCEPT_ENCODING).collect();
     let of = |wanted: &str| named.iter().find(|(name, _)| name == wanted);

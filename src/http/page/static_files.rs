@@ -45,7 +45,7 @@ const CLIENT: &[File] = files!["clients/":
     "js/wasm/bagtrack_wasm.js", "js/wasm/bagtrack_wasm_bg.wasm"
 ];
 
-/// All of them, by their names.
+/// The files of [`FILES`] and [`CLIENT`], by their names.
 static SERVED: LazyLock<BTreeMap<&str, Arc<StaticFile>>> = LazyLock::new(|| {
     let served = FILES.iter().chain(CLIENT).map(|(name, bytes)| {
         let bytes = Bytes::from_static(bytes);
@@ -64,7 +64,7 @@ fn media_type(name: &str) -> &'static str {
     }
 }
 
-/// `/`. Its links are relative, so a base path needs its slash.
+/// `/`. The page's links are relative, so a request for a base path without the slash at its end is redirected.
 pub async fn index(instance: Instance, headers: HeaderMap) -> Response {
     sample_clips::draw_ahead();
     match instance.path.ends_with('/') {
