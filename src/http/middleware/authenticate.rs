@@ -1,7 +1,7 @@
 //! Finds out who makes a request, from its header `Authorization: Bearer …`.
 //!
-//! A page cannot set that header where it opens a stream. There a session token may stand among the protocols that it
-//! offers (`Sec-WebSocket-Protocol`). An API key may not: it has no business in a page.
+//! A web page cannot set that header when it opens a WebSocket. It offers its session token as a protocol instead
+//! (`Sec-WebSocket-Protocol`). An API key is not taken there: it has no business in a page.
 
 use crate::http::extract::caller::Caller;
 use crate::http::problems::problem::Problem;
@@ -14,7 +14,7 @@ use bagtrack_access::{Credential, NotIdentified, TOKEN_PREFIX};
 use bagtrack_api::ProblemKind as Kind;
 use bagtrack_quotas::Client;
 
-/// What a request without a key or a token is told, and one whose token is not taken (RFC 6750, section 3).
+/// `WWW-Authenticate` where no valid key or session token was sent, and where a JWT is refused (RFC 6750, section 3).
 const CHALLENGE: HeaderValue = HeaderValue::from_static("Bearer realm=\"bagtrack\"");
 #[cfg(feature = "jwt")]
 const INVALID_TOKEN: HeaderValue =
@@ -23,11 +23,11 @@ const INVALID_TOKEN: HeaderValue =
 /// Puts the [`Caller`] into the extensions of the request.
 ///
 /// # Errors
-/// The answer 401.
+/// The request has no valid key or token: the error is the answer 401.
 pub async fn authenticate(state: &AppState, request: &mut Request) -> Result<(), Response> {
     match caller(state, request.headers()).await {
         Ok(caller) => {
-            // Who has a key shares its quotas, wherever the requests come from. A page is not to use them up.
+            // The quotas of a key hold for all its requests, whatever their addresses. A page has a part of them only.
             if let Some(name) = caller.owner().name() {
                 let client = match caller.page_of() {
                     Some(session) => Client::Page(name.into(), session),
@@ -45,7 +45,7 @@ pub async fn authenticate(state: &AppState, request: &mut Request) -> Result<(),
 /// Asks for the key of the metrics, where there is one, and else does as [`authenticate`].
 ///
 /// # Errors
-/// The answer 401.
+/// The request has no valid key or token: the error is the answer 401.
 pub async fn authenticate_metrics(state: &AppState, request: &mut Request) -> Result<(), Response> {
     let Some(key) = &state.config.access.metrics_key else {
         return authenticate(state, request).await;
@@ -72,7 +72,7 @@ fn unauthorized(refused: &NotIdentified, headers: &HeaderMap) -> Response {
     response
 }
 
-/// What is wrong with what a request came with.
+/// The problem of a request whose key or token is missing or not valid.
 fn not_identified(headers: &HeaderMap) -> Problem {
     let presented = bearer(headers).or_else(|| offered_token(headers));
     let detail = match presented {

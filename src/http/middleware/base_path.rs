@@ -1,7 +1,7 @@
 //! `--base-path`: the service below a path of a host that it shares with others.
 //!
-//! A proxy may take the path off requests or leave it, so requests are taken with it and without it. What the service
-//! answers has it: `Location`, the instance of a problem, the server of the OpenAPI document.
+//! A proxy may take the base path off requests or leave it, so the service takes requests with it and without it.
+//! Answers name it in `Location`, in the instance of a problem, and as the server of the OpenAPI document.
 
 use crate::http::extract::instance::ClientPath;
 use axum::Router;
@@ -18,7 +18,7 @@ pub fn mount(base: &BasePath, routes: Router) -> Router {
     if base.as_str().is_empty() {
         return routes;
     }
-    // The path is taken off before a route is looked for.
+    // A layer around a fallback runs before a route is looked for, so that it can take the base path off.
     let outer = Router::new().fallback_service(routes);
     outer.layer(middleware::from_fn_with_state(base.clone(), take_off))
 }

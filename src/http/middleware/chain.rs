@@ -1,7 +1,7 @@
 //! The middleware in the order in which requests meet it.
 //!
-//! All of them are one layer of axum, and those of some routes another one: for each layer and request, axum copies all
-//! that is further in, into a box. With a layer for each, that took a third of the network threads' time.
+//! The middleware of all requests is one layer of axum, and that of some routes another one. For each layer and request
+//! axum clones and boxes all inner services: with a layer each, that takes a third of the network threads' time.
 
 use super::answer_problems::answer_problems;
 use super::authenticate::{authenticate, authenticate_metrics};

@@ -1,10 +1,9 @@
 //! Which client a request is from, how often it may ask, and what it is told of its quotas.
 //!
-//! What takes no turn at the workers has a rate: pages, states, what is refused. Most of it is done on the network
-//! threads, so a client that asks as fast as it can takes them from the others. The other requests by GET count with
-//! it, though the metrics are rendered beside these threads, and a worker makes snapshots and pictures of the bag. The
-//! client is known by its address, since pages and refusals need no key. A trusted proxy that asks for itself is not
-//! counted.
+//! Requests that take no turn at the workers have a rate: pages, states of sessions, refused requests. Network threads
+//! do most of them, so a client that asks as fast as it can would take these threads from the others. All GET requests
+//! count, though another thread renders the metrics, and workers make snapshots and pictures of the bag. The client is
+//! known by its address, since pages and refusals need no key. A trusted proxy's own requests do not count.
 //!
 //! The answer has the quotas in the headers `RateLimit-Policy` and `RateLimit`
 //! (draft-ietf-httpapi-ratelimit-headers).
@@ -30,7 +29,7 @@ const REFUSAL_DELAY: Duration = Duration::from_millis(250);
 #[derive(Debug, Clone, Copy)]
 struct ClientAddress {
     address: IpAddr,
-    /// Whether a trusted proxy asks for itself.
+    /// Whether the request is a trusted proxy's own, not one that it forwards.
     is_proxy: bool,
 }
 
@@ -39,21 +38,21 @@ pub fn note_address(state: &AppState, request: &mut Request) -> IpAddr {
     let peer = peer.map_or(Ipv4Addr::UNSPECIFIED.into(), |Peer(peer)| peer.ip());
     let trusted = &state.config.limits.trusted_proxies;
     let address = client_address(peer, request.headers(), trusted);
-    // Clients of a proxy whose headers contradict each other have its address, too.
+    // The address alone does not tell: a client gets its proxy's where the proxy's headers contradict each other.
     let is_proxy = is_trusted(peer.to_canonical(), trusted) && !is_forwarded(request.headers());
     let noted = ClientAddress { address, is_proxy };
     request.extensions_mut().insert(noted);
     address
 }
 
-/// The client at the noted address; none where a trusted proxy asks for itself.
+/// The client at the noted address; `None` for a trusted proxy's own request.
 fn client_at(request: &Request) -> Option<Client> {
     let noted = request.extensions().get::<ClientAddress>();
     let noted = noted.filter(|noted| !noted.is_proxy)?;
     Some(Client::at(noted.address))
 }
 
-/// Notes the client of a request, which keeps one that it has already.
+/// Notes the client of a request by its address, unless its key names one. Its answer gets the headers with the quotas.
 pub async fn identify(
     state: &AppState,
     mut request: Request,
@@ -75,7 +74,7 @@ pub async fn identify(
     let mut response = next(request).await;
     let problem = response.extensions().get::<Problem>();
     if problem.is_some_and(|problem| problem.kind() == Kind::QuotaExceeded) {
-        // Whoever does not wait before it asks again costs the network threads time.
+        // Slows down a client that asks again at once, since its requests cost the network threads time.
         sleep(REFUSAL_DELAY).await;
     }
     if let Some(client) = client {
@@ -84,15 +83,16 @@ pub async fn identify(
     response
 }
 
-/// When a request counts.
+/// When a request counts against the rate of its client.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Counts {
-    /// Before it is answered, and it may be refused.
+    /// Before it is answered; over the rate it is refused.
     Always,
-    /// It is answered all the same, if late: whoever asks whether the service lives must not take it for dead, for the
-    /// haste of another client at its address.
+    /// After it is answered; over the rate its answer is only delayed: a supervisor must not take the service for dead
+    /// because another client at the same address asks too often.
     AsProbe,
-    /// Where it was refused, or answered as before: otherwise it took its turn at the workers.
+    /// After it is answered, and only where it was refused or got a stored answer: otherwise it took its turn at the
+    /// workers.
     WithoutWork,
 }
 
@@ -111,8 +111,7 @@ impl Counts {
     }
 }
 
-/// Bounds how often a client asks for what takes no turn at the workers: pages, states, what is refused. It has to see
-/// the matched route, and the address that was noted.
+/// Bounds how often a client sends requests that take no turn at the workers. Runs after routing and [`note_address`].
 pub async fn bound_rate(
     state: &AppState,
     request: Request,
@@ -126,7 +125,7 @@ pub async fn bound_rate(
     if counts == Counts::Always
         && let Err(exceeded) = count()
     {
-        // Whoever does not wait before it asks again is answered no faster.
+        // A client that asks again at once is answered no faster than one that waits.
         sleep(REFUSAL_DELAY).await;
         return Problem::from(exceeded).into_response();
     }

@@ -1,8 +1,8 @@
-//! Which hosts a request may name, and of which origins a page may be that calls.
+//! Which hosts a request may name, and from which origins a web page may call.
 //!
-//! Requests are refused that do not name one host, and those that a browser sends for a page of another origin, or
-//! under the name of another host. A browser sends "simple" posts of any page without asking first; CORS only hides the
-//! answer from the page. So the origin is checked, too. So is the [host](AllowedHosts).
+//! Refused are requests that do not name exactly one host, and those that a browser sends for a page of an origin, or
+//! under the name of a [host](AllowedHosts), that is not allowed. CORS alone does not do: a browser sends "simple"
+//! posts of any page without asking first, and only hides the answer from the page.
 
 use super::client_quotas::{RATE_LIMIT, RATE_LIMIT_POLICY};
 use super::response_headers::DRAINING;
@@ -19,8 +19,8 @@ use bagtrack_access::AllowedHosts;
 use std::time::Duration;
 use tower_http::cors::{AllowOrigin, CorsLayer};
 
-/// Refuses requests that do not name one host (RFC 9112, section 3.2): caches and proxies before the service might take
-/// another one of several.
+/// Refuses requests that do not name exactly one host (RFC 9112, section 3.2): of several, a cache or proxy before the
+/// service might take another one than the service does.
 pub fn one_host(request: &Request) -> Result<(), Problem> {
     let count = request.headers().get_all(HOST).iter().count();
     let may_lack = request.version() < Version::HTTP_11;
@@ -31,7 +31,7 @@ pub fn one_host(request: &Request) -> Result<(), Problem> {
     Err(Problem::malformed(detail))
 }
 
-/// Refuses what a browser sends for a page of another origin, or under the name of another host.
+/// Refuses requests to hosts that are not allowed, and browsers' requests for pages of origins that are not allowed.
 pub fn check_origin(state: &AppState, request: &Request) -> Result<(), Problem> {
     let hosts = AllowedHosts::of(&state.config, state.access.is_needed());
     let headers = request.headers();
@@ -47,8 +47,8 @@ pub fn check_origin(state: &AppState, request: &Request) -> Result<(), Problem> 
         return Ok(());
     };
     let origin = origin.to_str().unwrap_or("");
-    // Pages cannot set this header. A proxy may have changed the host, but not this. Over plain HTTP browsers send it
-    // to this machine only.
+    // Pages cannot set this header, and a proxy that changes the host leaves it as it is. Over plain HTTP browsers send
+    // it to their own machine only.
     let same = match text(headers, "sec-fetch-site") {
         Some(site) => matches!(site, "same-origin" | "none"),
         None => is_same_origin(origin, host),
@@ -70,7 +70,7 @@ fn is_same_origin(origin: &str, host: &str) -> bool {
     authority.is_some_and(|authority| !host.is_empty() && authority.eq_ignore_ascii_case(host))
 }
 
-/// How long a browser need not ask again. The largest that all of them keep to.
+/// How long a browser may keep the answer to a preflight request: the largest value that no browser shortens.
 const MAX_AGE: Duration = Duration::from_secs(7200);
 
 /// Tells browsers that pages of the allowed origins may make every call, and pages of other origins none.

@@ -1,12 +1,12 @@
 //! The body of a request: the pace at which it has to come, and what becomes of one that was refused.
 //!
-//! A body has a least rate: a client that sends a byte now and then would hold its connection and its session's place
-//! until the deadline of the body. That comes later the more has arrived, so that a video may take its time.
+//! A body has a least rate: otherwise a client that sends a byte now and then would hold its connection and its
+//! session's place until the deadline of the body. Each byte extends the deadline, so that a video may take its time.
 //!
 //! If a server answers and closes while the client still sends, the client's system reports a broken connection, and
 //! the problem document is lost. So when an error is answered before the body was read, the rest is read beside the
-//! answer, within bounds: at most as many bytes as a body may have, at its pace. A client that waits for `100 Continue`
-//! has sent nothing, and nothing is read from it.
+//! answer, within bounds: at most as many bytes as a body may have, at the pace of a body. Nothing is read from a
+//! client that waits for `100 Continue`: it has sent nothing.
 
 use crate::http::extract::body::TooSlow;
 use crate::http::state::AppState;
@@ -40,7 +40,7 @@ impl Paced {
         let rate = LeastRate::new(config.limits.body_grace, config.limits.min_body_rate);
         Self {
             body,
-            // What comes early may be followed by a pause.
+            // Bytes that come early pay for a pause afterwards.
             rate: rate.with_credit(config.body_timeout),
             deadline: LeastRate::new(config.body_timeout, BODY_BYTES_PER_SECOND),
         }
@@ -122,7 +122,7 @@ struct Returning {
 impl Drop for Returning {
     fn drop(&mut self) {
         if let (Some(body), Some(give_back)) = (self.body.take(), self.give_back.take()) {
-            // It cannot be sent when the request itself was dropped.
+            // Nobody receives the body when the request itself was dropped.
             let _ = give_back.send((body, self.polled));
         }
     }

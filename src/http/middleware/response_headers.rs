@@ -8,22 +8,22 @@ use axum::http::header::{
 use axum::http::{HeaderName, HeaderValue};
 use axum::response::Response;
 
-/// What a policy has to begin with that a page sets for itself. Nothing may be loaded, and no page may frame it.
+/// The policy of answers without one of their own: they load nothing, and no page frames them. All others begin so.
 pub const STRICT: &str =
     "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// The page at `/`: its own style sheet, scripts, worker with WebAssembly and pictures, files that the user opens, and
-/// calls to this service.
+/// The page at `/` may load its own style sheet, scripts, worker with WebAssembly and pictures, and files that the user
+/// opens; and call this service.
 pub const PAGE_POLICY: &str = "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; \
     script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; style-src 'self'; img-src 'self' data: blob:; \
     media-src blob:; connect-src 'self'";
 
-/// Swagger UI: its own files, styles within its elements, and calls to this service.
+/// Swagger UI may load its own files, have styles within its elements, and call this service.
 pub const DOCS_POLICY: &str = "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; \
     script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self'; \
     connect-src 'self'";
 
-/// What every answer has against misuse by pages.
+/// Headers of every answer, against misuse by web pages.
 pub const HEADERS: [(HeaderName, &str); 5] = [
     (X_CONTENT_TYPE_OPTIONS, "nosniff"),
     (X_FRAME_OPTIONS, "DENY"),
@@ -38,7 +38,7 @@ pub const HEADERS: [(HeaderName, &str); 5] = [
     ),
 ];
 
-/// Sets them on an answer, which is kept by no cache unless it says so itself. A page may have a policy of its own.
+/// Sets [`HEADERS`] on an answer. Without values of its own it gets the policy [`STRICT`], and no cache keeps it.
 pub fn secure(response: &mut Response) {
     let headers = response.headers_mut();
     for (name, value) in HEADERS {

@@ -2,9 +2,9 @@
 //! a span around what is logged on its behalf, and the trace that it belongs to.
 //!
 //! The span has the ids of the request and of its trace, the client's address, the name of its API key (never the key),
-//! the method, where some call has it, and the path: never bytes or boxes, no more of the path than any route has, and
-//! of a session's id only its beginning. Probes come every few seconds: without `debug` only a refused one has a line,
-//! which names it, and none has a span.
+//! the method (`other` where no call has it), and the path: never bytes or boxes, at most 200 bytes of the path, and of
+//! a session's id only its beginning. Probes come every few seconds: without the level `debug` they have no span, and
+//! only a refused probe has a line, which names it.
 
 use super::client_quotas::note_address;
 #[cfg(feature = "otel")]
@@ -90,7 +90,7 @@ fn logged(path: &str) -> String {
         let text = percent_decode_str(segment).decode_utf8_lossy();
         match text.parse::<Uuid>() {
             Ok(id) => short_id(id),
-            // It may be an id with more behind it.
+            // The segment may be an id with more behind it.
             Err(_) if follows => shortened(&text),
             Err(_) => segment.to_owned(),
         }
@@ -106,7 +106,7 @@ fn shortened(text: &str) -> String {
     }
 }
 
-/// Counts requests and their bytes. It has to see the matched route.
+/// Counts requests and their bytes. Runs after routing, since the route is a label.
 pub async fn count_request(
     state: &AppState,
     request: Request,
@@ -130,7 +130,7 @@ pub async fn count_request(
             sent.increment(bytes);
             response
         }
-        // Lines count as they are sent.
+        // A body of unknown length, such as lines of JSON, counts as it is sent.
         None => response.map(|body| {
             Body::new(body.inspect_frame(move |frame| {
                 let bytes = frame.data_ref().map_or(0, |data| data.len());
@@ -144,7 +144,7 @@ pub async fn count_request(
     response
 }
 
-/// Clients may send any word as the method.
+/// The method as a label. Clients may send any word as the method, and labels have to be few.
 fn method_label(method: &Method) -> &'static str {
     match *method {
         Method::GET => "GET",

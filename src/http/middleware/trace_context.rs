@@ -58,7 +58,7 @@ impl TraceContext {
     }
 }
 
-/// The trace and the span that the header names. Of a version to come, what follows the flags is left out.
+/// The trace and the span that the header names. In versions after 00 more may follow the flags, and is ignored.
 fn parse(text: &str) -> Option<TraceContext> {
     let mut fields = text.splitn(5, '-');
     let version = hexadecimal(fields.next()?, 2)?;
@@ -76,7 +76,7 @@ fn parse(text: &str) -> Option<TraceContext> {
     })
 }
 
-/// A field of lower-case hexadecimal digits.
+/// The value of a field that has this number of lower-case hexadecimal digits; `None` for any other field.
 fn hexadecimal(field: &str, digits: usize) -> Option<u128> {
     let is_digit = |byte: u8| matches!(byte, b'0'..=b'9' | b'a'..=b'f');
     let valid = field.len() == digits && field.bytes().all(is_digit);
@@ -97,7 +97,7 @@ pub mod exported {
     use tracing::Span;
     use tracing_opentelemetry::OpenTelemetrySpanExt;
 
-    /// Makes the span a child of the client's, and gives the trace and the span that are exported.
+    /// Makes the span a child of the client's. Returns the exported trace and span, or `context` without any.
     pub fn join(span: &Span, request: &Request, context: TraceContext) -> TraceContext {
         if let Some(parent) = context.parent {
             let remote = SpanContext::new(
@@ -107,7 +107,7 @@ pub mod exported {
                 true,
                 TraceState::default(),
             );
-            // It fails where nothing is exported.
+            // `set_parent` fails where nothing is exported.
             let _ = span.set_parent(Context::new().with_remote_span_context(remote));
         }
         span.set_attribute("http.request.method", request.method().to_string());
