@@ -62,7 +62,7 @@ impl<S: Settings> FromRequest<AppState> for SessionRequest<S> {
     }
 }
 
-/// A request with files and settings and no session. A session token does not do.
+/// A request with files and settings and no session. A session token is not enough.
 #[derive(Debug)]
 pub struct StatelessRequest<S> {
     pub client: Client,
@@ -94,11 +94,11 @@ impl<S: Settings> FromRequest<AppState> for StatelessRequest<S> {
 /// A request to look at a session's state, with its permits.
 #[derive(Debug)]
 pub struct ReadRequest<Q> {
-    /// The settings, read first.
+    /// The settings of the query, checked before the session is looked for.
     pub query: Q,
     pub permit: SessionPermit,
     pub queue: QueuePermit,
-    /// Pays for the answer; nothing so far.
+    /// The charge for the memory of the answer; 0 bytes so far.
     pub charge: Charge,
 }
 
@@ -126,9 +126,9 @@ impl<Q: FromRequestParts<AppState, Rejection = Problem> + Send> FromRequestParts
     }
 }
 
-/// What curl calls a body, whatever it is.
+/// The content type that `curl -d` gives any body.
 const FORM_URLENCODED: &str = "application/x-www-form-urlencoded";
-/// Least bytes of a body that is told to have lost some.
+/// Least bytes of a body for which the answer may be [`STRIPPED`]: shorter files may have no line breaks and zeros.
 const MIN_STRIPPED: usize = 256;
 
 const STRIPPED: &str =
@@ -146,16 +146,16 @@ pub struct Upload<S> {
     pub settings: S,
     /// The snapshot beside the files.
     pub snapshot: Option<Bytes>,
-    /// How the only file is stored, where it is a video.
+    /// The format of the only file, where it is a video.
     pub video: Option<VideoFormat>,
     /// Whether the content type says that the file is a session snapshot.
     pub is_snapshot: bool,
 }
 
 impl<S: Settings> Upload<S> {
-    /// Lets a request in, reads its body, then takes a place in the queue; `texts` are the settings of the query, where
-    /// the body has none of their names. JSON is parsed on a worker. The place holds the request's permit until its
-    /// work has ended, and the files their memory.
+    /// Lets a request in, reads its body, then takes a place in the queue. The settings of the query, `texts`, count
+    /// where the body does not have them. JSON is parsed on a worker. The place holds the request's permit until its
+    /// work has ended, and the files hold the charge for their memory.
     ///
     /// # Errors
     /// The request is not let in, the body cannot be read, it has too few or too many frames, a setting is wrong, the
@@ -215,7 +215,7 @@ impl<S: Settings> Upload<S> {
         if upload.video.is_none() {
             permit.count_frames(upload.files.len())?;
         }
-        // One frame may be refused for a newer one; the work of several would be lost.
+        // Overload may refuse a waiting request with one frame. Several are too much to send again: they wait.
         let queue = match upload.video.is_some() || upload.files.len() > 1 {
             true => queue.waiting(),
             false => queue,
@@ -226,7 +226,7 @@ impl<S: Settings> Upload<S> {
 
 struct Arrived {
     fields: Fields,
-    /// Its text, where it is JSON, which is still to be parsed.
+    /// The text of a JSON body, not parsed yet.
     json: Option<Bytes>,
     charge: Charge,
 }
@@ -250,7 +250,7 @@ impl Arrived {
         } else {
             let body = request.into_body();
             let bytes = body::read(body, max_bytes, &mut charge).await?;
-            // Labels are often wrong: those of curl's -d, and of generated clients that send a file.
+            // Content types are often wrong: those of `curl -d`, and of generated clients that send a file.
             let is_labelled = media_type == "application/json";
             if let Some(text) = json::text_of(&bytes, is_labelled) {
                 charge.grow(json::DECODED_PER_BYTE * text.len())?;
@@ -285,8 +285,8 @@ fn admit(state: &AppState, parts: &Parts) -> Result<RequestPermit, Problem> {
     Ok(account.request()?)
 }
 
-/// Whether bytes have lost all line breaks and zeros, as `curl -d` sends a file. No image of this length is without, or
-/// has letters alone, as a text.
+/// Whether bytes look like an image from which `curl -d` has taken all line breaks and zeros. A whole image of this
+/// length has some of them, and bytes that are all ASCII are a text.
 fn is_stripped(bytes: &[u8]) -> bool {
     let is_lost = |byte: &u8| matches!(byte, 0 | b'\n' | b'\r');
     bytes.len() >= MIN_STRIPPED && !bytes.is_ascii() && !bytes.iter().any(is_lost)

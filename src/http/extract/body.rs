@@ -1,7 +1,7 @@
-//! Reading a request body, and the problem that a failure is.
+//! Reading a request body, and the problems that its errors become.
 //!
 //! Memory is charged before it is taken: a body that only announces its length, or sends nothing, holds none. Bytes are
-//! copied into one buffer as they arrive, since a chunk of one byte by itself takes many times that.
+//! copied into one buffer as they arrive, since a chunk of one byte by itself takes many times the memory.
 
 use crate::http::problems::problem::Problem;
 use axum::body::{Body, Bytes};
@@ -28,16 +28,16 @@ pub(super) struct HeadTooLong;
 #[error("the body is too slow")]
 pub struct TooSlow;
 
-/// Bytes that arrive, with the memory that they are charged to.
+/// The bytes of a body as they arrive, with the charge for their memory.
 pub(super) struct Buffer<'a> {
     bytes: Vec<u8>,
-    /// Most bytes that may come.
+    /// Most bytes that are expected: the buffer's capacity does not double beyond.
     max: usize,
     charge: &'a mut Charge,
 }
 
 impl<'a> Buffer<'a> {
-    /// Empty, for at most `max` bytes.
+    /// An empty buffer, for about `max` bytes at most.
     pub(super) fn new(max: usize, charge: &'a mut Charge) -> Self {
         Self {
             bytes: Vec::new(),
@@ -49,7 +49,7 @@ impl<'a> Buffer<'a> {
     /// Adds a piece. The buffer doubles where it is too small.
     ///
     /// # Errors
-    /// There is no memory for it.
+    /// The memory budget has no room for the piece.
     pub(super) fn add(&mut self, piece: &[u8]) -> Result<(), BudgetFull> {
         let (len, capacity) = (self.bytes.len(), self.bytes.capacity());
         let needed = len + piece.len();
@@ -72,7 +72,7 @@ impl<'a> Buffer<'a> {
     }
 }
 
-/// A body whose reader keeps what arrives: `charge` pays for that.
+/// A body whose bytes are charged to `charge` as they arrive, for a reader that keeps them.
 pub(super) fn charged(body: Body, mut charge: Charge) -> Body {
     Body::from_stream(body.into_data_stream().map(move |piece| {
         let piece = piece?;
@@ -84,7 +84,7 @@ pub(super) fn charged(body: Body, mut charge: Charge) -> Body {
 /// Reads the whole body.
 ///
 /// # Errors
-/// It is too large, too slow or cut short, or there is no memory for it.
+/// The body is too large, too slow or cut short, or there is no memory for it.
 pub(super) async fn read(
     body: Body,
     max_bytes: usize,
@@ -104,8 +104,8 @@ pub(super) async fn read(
     Ok(buffer.finish())
 }
 
-/// The problem that an error of reading a body is, or of parsing it as it comes. The reason is somewhere in the chain
-/// of its causes.
+/// The problem of an error in reading a body, or in parsing a form as it arrives. The reason is somewhere in the chain
+/// of the error's sources.
 pub(super) fn problem(error: &(dyn Error + 'static), max_bytes: usize) -> Problem {
     let mut cause = Some(error);
     while let Some(error) = cause {

@@ -40,17 +40,17 @@ impl Caller {
         &self.credential
     }
 
-    /// Whose sessions these are.
+    /// The owner whose sessions the caller may use.
     pub fn owner(&self) -> &Owner {
         &self.credential.owner
     }
 
-    /// The only session that may be used, where the request came with a session token.
+    /// The id of the only session that may be used, where the request came with a session token.
     pub fn page_of(&self) -> Option<Uuid> {
         self.only.map(|only| only.id)
     }
 
-    /// Whether a session of this id may be used, if it is one of the owner's: see [`Self::find`].
+    /// Whether no session token stands against the use of this session. [`Self::find`] checks the owner, too.
     pub fn may_ask_for(&self, id: Uuid) -> bool {
         self.only.is_none_or(|only| only.id == id)
     }
@@ -58,7 +58,7 @@ impl Caller {
     /// The owner's live session of this id, if it may be used.
     ///
     /// # Errors
-    /// There is none, or the store gives no answer.
+    /// The owner has no such session, the session token is for another one, or the store gives no answer.
     pub async fn find(
         &self,
         state: &AppState,
@@ -72,10 +72,10 @@ impl Caller {
         }
     }
 
-    /// Refuses what a session token is not good for.
+    /// Refuses a caller with a session token, for what such a token is not good for.
     ///
     /// # Errors
-    /// The request came with one.
+    /// The request came with a session token.
     pub fn require_key(&self) -> Result<(), Problem> {
         match self.only {
             None => Ok(()),
@@ -101,8 +101,8 @@ impl<S: Send + Sync> FromRequestParts<S> for Caller {
     }
 }
 
-/// The id as it stands in the path, and who asks for it. It is looked up by [`SessionPath::find`], after the rest of
-/// the request head has been checked.
+/// The id of a session as it stands in the path, and who asks for it. The session is looked up by
+/// [`SessionPath::find`], after the rest of the request head has been checked.
 pub struct SessionPath {
     id: String,
     caller: Caller,
@@ -129,7 +129,7 @@ impl SessionPath {
         self.caller.find(state, self.id()?, flow).await
     }
 
-    /// The same, with its last answer up to the store's.
+    /// Like [`Self::find`], with the session's last answer brought up to the store's.
     pub async fn find_newest(&self, state: &AppState) -> Result<Arc<Session>, Problem> {
         let session = self.find(state).await?;
         let flow = state.flow(&self.client);

@@ -43,7 +43,7 @@ impl Instance {
         }
     }
 
-    /// The document of a problem with the request, which is counted, and written to the log with its cause.
+    /// Counts a problem of the request, writes it to the log with its cause, and returns its document.
     pub fn report(&self, state: &AppState, problem: &Problem) -> ProblemDocument {
         let cause = problem.cause();
         let (kind, cause) = (problem.kind().slug(), cause.as_deref());
@@ -54,7 +54,7 @@ impl Instance {
         self.count(state, problem)
     }
 
-    /// The document of a problem, which is counted.
+    /// Counts a problem, and returns its document.
     pub fn count(&self, state: &AppState, problem: &Problem) -> ProblemDocument {
         state.metrics.problem(problem.kind());
         let (path, id) = (self.path.clone(), self.request_id.clone());

@@ -18,7 +18,7 @@ use std::time::Duration;
 /// of texts that have escapes or line breaks in them.
 pub(super) const DECODED_PER_BYTE: usize = 2;
 
-/// Least processor time of parsing, for each byte: so a body that is surely slow to parse is known before.
+/// Least processor time of parsing a byte, in nanoseconds: it tells before that a large body is slow to parse.
 const NANOS_PER_BYTE: u64 = 2;
 
 /// Least processor time of parsing so many bytes.
@@ -69,8 +69,8 @@ impl<'de> Visitor<'de> for ObjectVisitor {
 /// The mark that some editors put before UTF-8.
 const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 
-/// The text of a body that is JSON. It begins with `{`, after a byte order mark and blanks; no image and no snapshot
-/// does. A text that is labelled as JSON is no image either.
+/// The text of a body that is JSON, else `None`. JSON begins with `{`, after a byte order mark and blanks; no image and
+/// no snapshot does. A body that is labelled as JSON counts, too, if it begins with printable characters.
 pub(super) fn text_of(body: &[u8], is_labelled: bool) -> Option<&[u8]> {
     let body = body.strip_prefix(BYTE_ORDER_MARK).unwrap_or(body);
     let text = body.trim_ascii_start();
@@ -133,10 +133,10 @@ fn text<'a>(name: &str, value: &'a RawValue) -> Result<Cow<'a, str>, Problem> {
     }
 }
 
-/// The file of a text.
+/// The bytes of a file from its base64 or its data URL.
 ///
 /// # Errors
-/// It is not base64.
+/// The text is a URL, or not base64 in the standard alphabet.
 fn decode(text: &str) -> Result<Bytes, Problem> {
     if let Some((scheme, _)) = text.trim_start().split_once("://")
         && scheme.chars().all(|c| c.is_ascii_alphanumeric())

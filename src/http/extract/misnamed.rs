@@ -1,5 +1,5 @@
-//! Files under another name than `frame`, which is the likeliest mistake of all, boxes under another name than `box`,
-//! and settings in the wrong place.
+//! Problems that name likely mistakes: files under another name than `frame` (the likeliest of all), boxes under
+//! another name than `box`, and settings in the wrong place.
 
 use crate::http::problems::problem::Problem;
 use bagtrack_api::ProblemKind as Kind;
@@ -8,13 +8,13 @@ use bagtrack_ingest::{self as ingest, video};
 use bagtrack_tracker::Params;
 use serde_json::{Value, json};
 
-/// What files are called elsewhere, without `[]` at the end.
+/// Names of files in other services' interfaces, without `[]` at the end.
 const FILE_NAMES: [&str; 16] = [
     "data", "file", "files", "frame", "frames", "image", "images", "img", "imgs", "media", "photo",
     "photos", "picture", "pictures", "upload", "video",
 ];
 
-/// What boxes and their sides are called elsewhere.
+/// Names of boxes and of their sides in other services' interfaces.
 const BOX_NAMES: [&str; 12] = [
     "bbox", "h", "height", "left", "rect", "region", "roi", "top", "w", "width", "x", "y",
 ];
@@ -29,7 +29,7 @@ fn is_setting<S: Settings>(name: &str) -> bool {
     settings.iter().any(|setting| setting.name == name)
 }
 
-/// The problem of a part of a form that is called so and begins with these bytes, if it is a file and no setting.
+/// The problem of a form's part with this name and these first bytes; `None` unless it is a misnamed file.
 pub(super) fn part<S: Settings>(name: &str, has_file_name: bool, bytes: &[u8]) -> Option<Problem> {
     if is_setting::<S>(name) {
         return None;
@@ -46,7 +46,7 @@ pub(super) fn part<S: Settings>(name: &str, has_file_name: bool, bytes: &[u8]) -
     })
 }
 
-/// The problem of a field of a JSON object that is called so and has this value, if it holds a file.
+/// The problem of a JSON field with this name and value; `None` unless it is a misnamed file.
 pub(super) fn field<S: Settings>(name: &str, value: &str) -> Option<Problem> {
     let is_text = value.starts_with(['"', '[']);
     (is_text && is_name_of_file(name) && !is_setting::<S>(name)).then(|| {
@@ -63,7 +63,7 @@ pub(super) fn field<S: Settings>(name: &str, value: &str) -> Option<Problem> {
     })
 }
 
-/// The problem of a setting that is called so and has this value, if it is known what was meant.
+/// The problem of an unknown setting with this name and value; `None` where it is not clear what was meant.
 pub(super) fn setting<S: Settings>(name: &str, text: &str) -> Option<Problem> {
     if is_setting::<S>(name) {
         return None;
@@ -71,7 +71,7 @@ pub(super) fn setting<S: Settings>(name: &str, text: &str) -> Option<Problem> {
     parameter::<S>(name, text).or_else(|| rect::<S>(name))
 }
 
-/// The problem of a box that is called so, or that is given where none is taken.
+/// The problem of a box under a wrong name, or where no box is taken.
 fn rect<S: Settings>(name: &str) -> Option<Problem> {
     let detail = match is_setting::<S>("box") {
         true if BOX_NAMES.contains(&&*name.to_ascii_lowercase()) => {

@@ -3,8 +3,8 @@
 //! In: a request whose body is a raw file, `multipart/form-data`, or JSON with base64. JSON is what begins with `{`,
 //! after blanks. A raw body may have any content type: the type of a frame is taken from its bytes, curl labels what it
 //! sends as `application/x-www-form-urlencoded` unless it is told otherwise, and generated clients label a file as JSON
-//! where a call takes both. Settings come in the query, or as fields of the form or the JSON, which count where the
-//! query has them too. In each of the two a setting may stand once.
+//! where a call takes both. Settings come in the query, or as fields of the form or the JSON. Where both have a
+//! setting, the field counts. Neither may have a setting twice.
 //!
 //! Out: an [`Upload`](admitted::Upload) with the files and the [`Settings`](bagtrack_api::requests::Settings) type of
 //! the route. Handlers get it by an extractor, which refuses a request as early as it can: first for its query, then

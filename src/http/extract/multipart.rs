@@ -1,8 +1,8 @@
 //! Multipart uploads: `frame` parts are files, and `snapshot` is one where a route takes it; all others are settings.
 //!
-//! The parser looks through all that it has for the next part whenever a piece comes (docs/upstream/multer.md). So
-//! small pieces are gathered, it gets them only when it can do nothing with what it has, and the head of a part is
-//! bounded: a body costs time in proportion to its bytes.
+//! Whenever a piece of the body comes, the parser searches all bytes that it has again (docs/upstream/multer.md). So
+//! small pieces are gathered, the parser gets them only when it can do nothing with what it has, and the head of a part
+//! is bounded: then the time is in proportion to the bytes of the body.
 
 use super::body::{self, Buffer, HeadTooLong, MAX_HEAD_BYTES};
 use super::misnamed;
@@ -21,8 +21,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::task::{Context, Poll};
 
-/// Most bytes of the content type. A boundary has at most 70 (RFC 2046, section 5.1.1), and what may be the beginning
-/// of one is looked through again whenever a piece comes.
+/// Most bytes of the content type. A boundary has at most 70 (RFC 2046, section 5.1.1), and bytes that may be the
+/// beginning of a boundary are searched again whenever a piece comes.
 const MAX_TYPE_BYTES: usize = 256;
 
 /// Pieces of fewer bytes are gathered, as far as they have come.
@@ -31,9 +31,9 @@ const ENOUGH_BYTES: usize = 8 << 10;
 /// How far the parser is.
 #[derive(Debug, Default)]
 struct Progress {
-    /// Bytes that it got since it gave anything out.
+    /// Bytes that the parser got since it last gave something out.
     kept: AtomicUsize,
-    /// Whether it may go on without a further piece.
+    /// Whether the parser may go on without a further piece.
     may_go_on: AtomicBool,
 }
 
@@ -45,7 +45,7 @@ impl Progress {
     }
 }
 
-/// A body that comes step by step, small pieces together.
+/// A body that gives the parser gathered pieces, and none while the parser can go on without.
 struct Stepwise {
     body: Body,
     has_ended: bool,
@@ -132,7 +132,7 @@ pub(super) async fn read<S: Settings>(
         if name == "snapshot" && S::TAKES_SNAPSHOT && fields.snapshot.is_none() {
             fields.snapshot = Some(read_part(part, &progress, max_bytes, max_bytes, charge).await?);
         } else if name != "frame" {
-            // One byte more than may be, so that a longer text is refused as such.
+            // One byte more than a setting may have, so that a longer text is refused as too long.
             let has_file_name = part.file_name().is_some();
             let text = read_part(part, &progress, max_bytes, MAX_TEXT_BYTES + 1, charge).await?;
             if let Some(problem) = misnamed::part::<S>(&name, has_file_name, &text) {
@@ -140,7 +140,7 @@ pub(super) async fn read<S: Settings>(
             }
             fields.texts.add(&name, &String::from_utf8_lossy(&text))?;
         } else if fields.files.len() < max_files {
-            // Beside other files, a video's is the one that tells.
+            // Of several files the type of a video is kept.
             let told = fields.media_type.take();
             let told = told.filter(|kind| kind.starts_with("video/"));
             fields.media_type = told.or(part.content_type().map(str::to_lowercase));

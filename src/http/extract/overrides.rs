@@ -7,7 +7,7 @@ use bagtrack_sessions::random::random_range;
 use bagtrack_sessions::{Boxes, PerTarget};
 use bagtrack_tracker::{Params, Rect};
 
-/// The longest list of boxes is as long as a session has targets.
+/// The interface takes as many boxes as a session may have targets.
 const _: () = assert!(api::MAX_TARGETS == bagtrack_sessions::MAX_TARGETS);
 
 pub fn rect(target: api::Rect) -> Rect {

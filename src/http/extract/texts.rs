@@ -46,7 +46,7 @@ impl Texts {
     /// Adds one setting.
     ///
     /// # Errors
-    /// It was there before, it is too long, or there are too many.
+    /// The setting is there already, its name or text is too long, or there are too many settings.
     pub fn add(&mut self, name: &str, text: &str) -> Result<(), Problem> {
         let text = text.trim();
         if name.len() > MAX_NAME_BYTES || self.0.len() >= MAX_SETTINGS {
@@ -78,7 +78,7 @@ impl Texts {
     /// The settings.
     ///
     /// # Errors
-    /// One is unknown, or its text is no value of its type.
+    /// A setting is unknown, or its text is no value of its type.
     pub fn parse<S: Settings>(self) -> Result<S, Problem> {
         let misplaced = self.0.iter().find_map(|(name, text)| {
             misnamed::setting::<S>(name, text.as_str().unwrap_or_default())
@@ -96,7 +96,7 @@ impl Texts {
 #[derive(Debug, Default)]
 pub(super) struct Fields {
     pub(super) files: Vec<Bytes>,
-    /// That of a file, where a form tells it.
+    /// The content type of a file's part, where the body is a form.
     pub(super) media_type: Option<String>,
     pub(super) snapshot: Option<Bytes>,
     pub(super) texts: Texts,

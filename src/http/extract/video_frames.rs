@@ -1,4 +1,4 @@
-//! The frames of an uploaded video, as they are decoded, in a place for its process.
+//! The frames of an uploaded video, as an `ffmpeg` process decodes them. The process has a [place](VideoPlace).
 //!
 //! A client has one place at a time, so that another client gets the next.
 
@@ -18,7 +18,7 @@ use std::thread;
 use std::time::Duration;
 use tokio::sync::{OwnedSemaphorePermit, mpsc};
 
-/// Decoded pictures that wait to be tracked.
+/// Most decoded pictures that wait to be tracked.
 const MAX_WAITING: usize = 2;
 const SMALLER: &str =
     "Send it smaller: `ffmpeg -i VIDEO -vf scale=1920:-2 smaller.mp4` makes it so.";
@@ -29,9 +29,9 @@ const CODECS: &str = "Send H.264, H.265, VP8, VP9, AV1, MPEG-4, H.263 or Motion 
 pub struct VideoFrames {
     pictures: mpsc::Receiver<Result<VideoPicture, VideoError>>,
     patience: Duration,
-    /// Most frames that count.
+    /// Most frames of a request, beside those that are passed over.
     max_frames: usize,
-    /// Frames before these, which are passed over.
+    /// Frames at the beginning that are decoded only to be passed over.
     passed_over: usize,
     given: usize,
     _stop: Stop,
@@ -39,10 +39,10 @@ pub struct VideoFrames {
 }
 
 impl VideoFrames {
-    /// Begins to decode a video, in its place. Its first `passed_over` frames do not count.
+    /// Begins to decode a video, whose process has `place`. Its first `passed_over` frames do not count for the limit.
     ///
     /// # Errors
-    /// There is no program for it.
+    /// The service has no `ffmpeg`, or cannot start it.
     pub async fn decode(
         state: &AppState,
         video: Bytes,
@@ -66,7 +66,7 @@ impl VideoFrames {
             config.limits.ffmpeg_launcher.clone(),
             config.limits.ffmpeg.clone(),
         );
-        // The bytes are copied, and a process is started.
+        // This may block: the bytes are copied, and a process is started.
         let begin = move || VideoDecoder::of_bytes(&launcher, &program, video, format, limits);
         let begun = tokio::task::spawn_blocking(begin).await;
         let mut decoder = begun.map_err(|error| Problem::internal(Arc::new(error)))??;
@@ -190,10 +190,10 @@ pub struct VideoPlace {
     _of_all: OwnedSemaphorePermit,
 }
 
-/// Waits until a frame of a video has a place in the client's quota of frames.
+/// Counts a frame of a video, once the client's rate of frames allows it.
 ///
 /// # Errors
-/// It has none in the time that a request may take.
+/// The rate does not allow it within the work timeout.
 pub async fn count_frame(state: &AppState, client: &Client) -> Result<(), Problem> {
     let deadline = clock::now() + state.config.work_timeout;
     let account = state.clients.account(client);
@@ -201,8 +201,8 @@ pub async fn count_frame(state: &AppState, client: &Client) -> Result<(), Proble
 }
 
 impl VideoPlace {
-    /// Waits for a place, as long as a request may. Meanwhile another request may have the place in the queue. A video
-    /// may take the processor time of as many requests as its frames would be posted in.
+    /// Waits for a place, at most for the work timeout. Meanwhile the request gives up its place in the queue. A video
+    /// may take the processor time of as many requests as posts of its frames would need.
     ///
     /// # Errors
     /// The client's other video, or those of others, take longer; or the queue is full after the wait.

@@ -1,4 +1,4 @@
-//! The frames of an uploaded video that are tracked, in their order: from one of them on, or back from it.
+//! The frames of an uploaded video that are tracked, in their order: from a first one forwards, or backwards.
 
 use super::video_frames::VideoFrames;
 use crate::http::problems::problem::Problem;
@@ -8,19 +8,19 @@ use bagtrack_ingest::video::VideoPicture;
 use bagtrack_sessions::Charge;
 use std::collections::VecDeque;
 
-/// Which frames of a video.
+/// Which frames of a video are tracked.
 #[derive(Debug, Clone, Copy)]
 pub struct VideoRange {
-    /// The first one, counted from 0.
+    /// The number of the first one, counted from 0.
     pub start: u64,
-    /// At most so many after it.
+    /// Most frames after the first one.
     pub count: u64,
-    /// Whether those before `start` come after it, back to frame 0.
+    /// Whether the frames before `start` follow it, in reverse order down to frame 0.
     pub backwards: bool,
 }
 
 impl VideoRange {
-    /// How many frames are before the first one that is wanted.
+    /// How many frames of the video come before all that are wanted.
     pub fn passed_over(&self) -> u64 {
         match self.backwards {
             true => self.start.saturating_sub(self.count),
@@ -40,8 +40,8 @@ pub struct RangeFrame {
     pub file: Bytes,
 }
 
-/// The frames of a range, as they are decoded. Those that are taken backwards are kept as JPEG files, and their bytes
-/// are charged as those of uploads.
+/// The frames of a range, as they are decoded. Frames of a backward range are kept as JPEG files until they are given,
+/// and their bytes are charged like uploads.
 #[derive(Debug)]
 pub struct RangeFrames {
     video: VideoFrames,
@@ -53,7 +53,7 @@ pub struct RangeFrames {
     begin: f64,
     /// How many frames were given.
     given: u64,
-    /// Those that are still to be given backwards; the next one is the last.
+    /// Frames that are still to be given, by their numbers; the last one is given next.
     kept: VecDeque<RangeFrame>,
     bytes: usize,
     /// Whether there is a frame after `start`, where the frames go backwards from there.
@@ -124,7 +124,7 @@ impl RangeFrames {
         }))
     }
 
-    /// Says how the frames after those of one request are tracked.
+    /// Where a request has too many frames, says how to track the rest in another one.
     fn with_rest(&self, problem: Problem) -> Problem {
         if problem.kind() != Kind::TooManyFrames {
             return problem;
@@ -133,7 +133,7 @@ impl RangeFrames {
         problem.and(&format!("`start={last}` with its last box goes on."))
     }
 
-    /// Decodes up to the first frame. It is kept, and backwards those before it that are wanted.
+    /// Decodes up to frame `start`, and keeps it; of a backward range, the wanted frames before it, too.
     async fn reach_start(&mut self) -> Result<(), Problem> {
         let VideoRange {
             start,
@@ -159,7 +159,7 @@ impl RangeFrames {
         Ok(())
     }
 
-    /// Whether the video has a frame after all that were given. No other one is given afterwards.
+    /// Whether the video has a frame after all that were given. May decode that frame and drop it, so call this last.
     pub async fn go_on(&mut self) -> bool {
         match self.range.backwards {
             true => self.goes_on,
