@@ -35,7 +35,7 @@ pub async fn get(
     let draw = move |state: &SessionState| {
         let bag = state.bag(target);
         let sheet = ContactSheet::of(&bag.ok_or_else(|| Problem::which_target(count))?);
-        // The pixels, and the file.
+        // Room for the pixels, and for the PNG file.
         charge.grow(2 * sheet.bytes())?;
         let png = sheet.png();
         let png = png.map_err(|error| Problem::internal(Arc::new(error)))?;

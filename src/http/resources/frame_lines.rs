@@ -1,8 +1,8 @@
 //! The frames of a post that are answered by lines, or of a video.
 //!
-//! What one request may take holds for all frames together: pixels, processor time, and the time until the last is
-//! tracked. A video has the processor time of as many requests as its frames would be posted in, and no end but that of
-//! its frames.
+//! The limits of one request hold for all frames together: pixels, processor time, and the time until the last is
+//! tracked. A video may take the processor time of as many requests as posts of its frames would need, and has no
+//! deadline.
 
 use super::frames::FramesRequest;
 use crate::http::extract::video_frames::{VideoFrames, VideoPlace, count_frame};
@@ -26,7 +26,7 @@ use std::vec::IntoIter;
 /// Answers the frames by lines.
 ///
 /// # Errors
-/// Their pixels are more than those of one request may; or the problem of the first frame.
+/// The frames have more pixels than one request may have; or the problem of the first frame.
 pub async fn respond(state: AppState, mut request: FramesRequest) -> Result<Response, Problem> {
     let deadline = clock::now() + state.config.work_timeout;
     let limits = state.service.request_limits();
@@ -47,7 +47,7 @@ pub async fn respond(state: AppState, mut request: FramesRequest) -> Result<Resp
 /// Answers the pictures of the only file by lines.
 ///
 /// # Errors
-/// There is no place for it, or no program; or the problem of the first picture.
+/// There is no place to decode the video, or no `ffmpeg`; or the problem of the first picture.
 pub async fn respond_to_video(
     state: AppState,
     mut request: FramesRequest,
@@ -71,7 +71,7 @@ async fn respond_to(
     let session = request.permit.session().clone();
     let number = request.number();
     if number.is_some() {
-        // What is compared with the number must be the newest.
+        // The client's number is compared with the latest frame, and the store may have a later one.
         let flow = request.queue.flow();
         state.service.refresh(&session, None, flow).await?;
     }
@@ -91,7 +91,7 @@ async fn respond_to(
 /// Where frames come from.
 #[derive(Debug)]
 enum FrameSource {
-    /// Files of the request, and when the last has to be tracked.
+    /// The files of the request, and the time by which the last has to be tracked.
     Files(IntoIter<Bytes>, Instant),
     Video(VideoFrames),
 }
@@ -108,7 +108,7 @@ struct SessionFrames {
     count: usize,
     /// The number of the next frame, where it is known.
     number: Option<u64>,
-    /// Why the last picture of a video has no line: its answer is no longer stored.
+    /// The problem of the last picture of a video, if it got no line because its answer is no longer stored.
     too_old: Option<Problem>,
 }
 
@@ -131,7 +131,7 @@ impl FrameSequence for SessionFrames {
                 Err(problem) => return Some(Err(problem)),
             };
             match self.answer(file).await {
-                // A long video that is sent again goes on: pictures of which no answer is stored get no line.
+                // A long video that is sent again goes on: pictures whose answers are no longer stored get no line.
                 Err(problem) if self.is_too_old(&problem) => self.pass_over(problem),
                 answer => {
                     self.too_old = None;
@@ -143,7 +143,7 @@ impl FrameSequence for SessionFrames {
 }
 
 impl SessionFrames {
-    /// The next picture of the video; after the last the problem of one that has no line, where no later one has.
+    /// The next picture of the video. After the last one: the problem in `too_old`, if there is one, and then `None`.
     async fn picture(&mut self) -> Option<Result<Bytes, Problem>> {
         let FrameSource::Video(video) = &mut self.source else {
             return None;
@@ -176,12 +176,12 @@ impl SessionFrames {
             count_frame(&self.state, &self.client).await?;
         }
         let mut next = FrameBatch::posted(self.number, vec![file], None);
-        // So that the request can be sent again when its line breaks.
+        // So that the request can be sent again after its connection broke.
         next.min_answers = self.state.config.max_frames.max(KEPT_ANSWERS);
         let (service, queue) = (&self.state.service, self.queue.clone());
         let tracked = service.advance(self.permit.share(), queue, next).await?;
         let estimates = &tracked.estimates[0];
-        // No other request may come between two frames of this one.
+        // With this number the next frame is refused if a frame of another request came between.
         self.number = Some(estimates.first().frame + 1);
         Ok(StreamAnswer {
             replayed: tracked.replayed,

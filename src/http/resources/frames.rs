@@ -105,7 +105,7 @@ async fn respond_at_once(state: &AppState, request: FramesRequest) -> Result<Res
     let targets = request.permit.session().target_count();
     let batch = FrameBatch::posted(request.number(), request.upload.files, None);
     let queue = request.queue.for_frames(batch.files.len() * targets);
-    // Before the frames are tracked: what cannot be answered must not count.
+    // Charged before the frames are tracked: a frame that cannot be answered must not count.
     let mut charge = state.charge(&request.client);
     charge.grow(answer_bytes(batch.files.len(), targets))?;
     let tracked = state.service.advance(request.permit, queue, batch).await?;

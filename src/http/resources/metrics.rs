@@ -36,8 +36,8 @@ pub async fn get(
     Ok(([(CONTENT_TYPE, MEDIA_TYPE)], text))
 }
 
-/// The metrics as they are now. It takes a millisecond and more, so it is done beside the network threads: one at a
-/// time, and once for all who asked before it began.
+/// The text of the metrics at this moment. Rendering takes a millisecond and more, so a thread for blocking work does
+/// it: one text at a time, for all requests that came before it was begun.
 async fn rendered(state: &AppState) -> Result<Bytes, Problem> {
     let asked = clock::now();
     let mut rendered = state.rendered_metrics.lock().await;

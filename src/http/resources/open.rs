@@ -20,7 +20,7 @@ use serde_json::json;
 use std::sync::Arc;
 use uuid::Uuid;
 
-/// The format of the digest of a request.
+/// The number of the digest's format, which is digested, too.
 const DIGEST_FORMAT: u8 = 1;
 
 type CreateForm = FormBody<CreateSettings>;
@@ -92,7 +92,7 @@ pub async fn put(state: State<AppState>, request: CreateRequest) -> Result<Respo
 #[derive(Debug)]
 pub struct CreateRequest {
     pub caller: Caller,
-    /// What the client calls the session, where it gives it a name.
+    /// The id or the idempotency key that the client gave the new session.
     pub key: Option<CreationKey>,
     pub account: Arc<Account>,
     pub queue: QueuePermit,
@@ -121,7 +121,7 @@ impl FromRequest<AppState> for CreateRequest {
             (None, None) => None,
         };
         let account = state.clients.account(&client_of(&parts));
-        // A request that comes again may have its answer already.
+        // A repeated request may have its answer already, and then needs no room.
         if key.is_none() {
             let quota = ClientSessions(account.clone());
             state.service.check_room(&quota)?;
@@ -143,7 +143,7 @@ impl CreateRequest {
         self.upload.settings.verbose.0
     }
 
-    /// What is asked for.
+    /// The act that is asked for.
     ///
     /// # Errors
     /// There is no box, a parameter is unknown, or settings stand beside a snapshot.
@@ -182,8 +182,8 @@ impl CreateRequest {
         })
     }
 
-    /// A digest of the frame and the settings, whichever form they came in: of their JSON, with a format number. It is
-    /// compared with those of other replicas.
+    /// A digest of the frame and the settings, the same whichever form they came in. Replicas compare their digests, so
+    /// that any change of the digested JSON needs another [`DIGEST_FORMAT`].
     fn digest(&self) -> [u8; 32] {
         let CreateSettings {
             r#box,
@@ -191,7 +191,7 @@ impl CreateRequest {
             preset,
             seed,
             params,
-            // Another request for the same session.
+            // A repeated request may ask for a longer or shorter answer.
             verbose: _,
         } = &self.upload.settings;
         let frame = blake3::hash(&self.upload.files[0]).to_hex();
@@ -211,8 +211,8 @@ impl CreateRequest {
     }
 }
 
-/// An idempotency key as it is kept. Each client has keys of its own: where there are no API keys, which tell clients
-/// apart otherwise, each address.
+/// An idempotency key as it is kept. Each owner has keys of its own. Without API keys all clients are one owner, so the
+/// client's address is put before the key.
 fn scoped(key: String, state: &AppState, client: &Client) -> String {
     match client {
         Client::Address(address) if !state.access.is_needed() => format!("{address} {key}"),

@@ -160,7 +160,7 @@ fn begin(settings: TrackSettings) -> Result<(Boxes, Box<Params>), Problem> {
     Ok((boxes, Box::new(params)))
 }
 
-/// Frames that are no video are all tracked, in their order.
+/// Refuses settings of videos: frames that are no video are all tracked, in their order.
 fn check_no_range(settings: &TrackSettings) -> Result<(), Problem> {
     let switches = [settings.backwards, settings.until_lost, settings.keyframes];
     let is_given = settings.start.is_some() || settings.count.is_some();
@@ -174,11 +174,11 @@ fn check_no_range(settings: &TrackSettings) -> Result<(), Problem> {
     }
 }
 
-/// Where the track stands, and the frames.
+/// What the track begins with or goes on from, and its next frames.
 fn asked(upload: Upload<TrackSettings>) -> Result<(TrackFrom, Vec<Bytes>), Problem> {
     let (settings, files) = (upload.settings, upload.files);
     let Some(snapshot) = upload.snapshot else {
-        // A video that is not read is told as that, not as no video.
+        // A known type that is not read, such as AVI, is named, and not taken for a bad setting.
         if let Some(name) = files.first().and_then(|file| unread_type(file)) {
             return Err(IngestError::UnreadFormat(name).into());
         }
@@ -208,10 +208,10 @@ fn asked(upload: Upload<TrackSettings>) -> Result<(TrackFrom, Vec<Bytes>), Probl
     Ok((TrackFrom::Snapshot(snapshot, correction), files))
 }
 
-/// The body of the answer, whose memory is charged before it is taken.
+/// The body of the answer, whose memory is charged before it is allocated.
 fn body(tracked: &TrackedAway, mut charge: Charge) -> Result<ChargedBody, Problem> {
     let (estimates, snapshot) = (&tracked.estimates[..], &tracked.snapshot);
-    // It is there as base64, and once more in the body.
+    // The snapshot is in memory as base64, and once more in the body.
     let text = snapshot.len().div_ceil(3) * 4;
     let targets = estimates.first().map_or(1, |first| first.as_slice().len());
     charge.grow(2 * text + answer_bytes(estimates.len(), targets))?;

@@ -16,7 +16,7 @@ const ROW_BYTES: usize = 1024;
 /// Frames a second, where neither the caller nor the video tells.
 const USUAL_RATE: f64 = 25.0;
 
-/// What a file of tracked boxes says beside them.
+/// What a file of tracked boxes says beside the boxes.
 #[derive(Debug)]
 pub struct TrackFile {
     format: FileFormat,
@@ -57,7 +57,8 @@ impl TrackFile {
     /// The file that is asked for; none where the answers are to come frame by frame.
     ///
     /// # Errors
-    /// Its format cannot say what is asked for, or something is said of a file that is not asked for.
+    /// The format cannot hold what is asked for, there are more names than targets, or `names`, `video_name` or `rate`
+    /// come without `format`.
     pub fn asked(settings: &TrackSettings) -> Result<Option<Self>, Problem> {
         let Some(format) = settings.format else {
             let said = [
@@ -90,7 +91,7 @@ impl TrackFile {
     /// Tracks the video to its end, and answers with the file. Its memory is charged as its rows come.
     ///
     /// # Errors
-    /// A frame cannot be had or not be tracked, or there is no memory for the rows.
+    /// A frame cannot be decoded or tracked, or there is no memory for the rows.
     pub async fn respond(
         self,
         mut video: VideoTrack,
@@ -154,7 +155,7 @@ impl TrackFile {
     }
 }
 
-/// Says how the frames before the one that cannot be had are tracked.
+/// Adds to a problem of the video how to get the file of the frames before the bad one.
 fn before(problem: Problem, given: u64) -> Problem {
     let is_of_video = matches!(
         problem.kind(),

@@ -27,9 +27,9 @@ pub struct VideoTrack {
 /// How far a video is tracked.
 #[derive(Debug)]
 pub enum Track {
-    /// It begins with these targets in the first frame.
+    /// No frame is tracked. The targets' boxes in the first frame, and the parameters.
     Start(Boxes, Box<Params>),
-    /// Up to here.
+    /// The state after the last tracked frame.
     At(Box<SessionState>),
     /// A frame could not be tracked.
     Ended,
@@ -53,7 +53,7 @@ impl VideoTrack {
     /// Tracks through the next frame; none after the last.
     ///
     /// # Errors
-    /// The frame cannot be had, or not be tracked. Then no other one is.
+    /// The frame cannot be decoded or tracked. Then no later one is tracked.
     pub async fn next(&mut self) -> Result<Option<TrackedFrame>, Problem> {
         let Some(next) = self.frames.next().await else {
             return Ok(None);
@@ -105,9 +105,9 @@ pub struct VideoAnswers {
 /// Why no further frame is tracked.
 #[derive(Debug)]
 pub enum End {
-    /// All that were wanted are.
+    /// All wanted frames are tracked.
     Complete,
-    /// This is the last line.
+    /// A frame was refused. Its problem is the last line.
     Refused(Problem),
 }
 
@@ -136,7 +136,7 @@ impl FrameSequence for VideoAnswers {
 }
 
 impl VideoAnswers {
-    /// Tracks through the next frame, and gives the answer that is known to be wanted now.
+    /// Tracks through the next frame, and returns an answer to send, if any: a key frame is known one frame later.
     async fn step(&mut self) -> Result<Option<Answer>, End> {
         if self.selection.has_ended() {
             return Err(End::Complete);
@@ -153,7 +153,7 @@ impl VideoAnswers {
     }
 }
 
-/// The answer of a frame, whose rows are the same for each target; none where no row is given.
+/// The answer of a frame from its rows, each of which is a clone of it for a target; `None` without rows.
 fn only(rows: Vec<Arc<Answer>>) -> Option<Answer> {
     rows.into_iter().next().map(Arc::unwrap_or_clone)
 }

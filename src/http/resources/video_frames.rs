@@ -70,7 +70,7 @@ pub async fn post(
     ))
 }
 
-/// The next frame, which counts as one of the client's.
+/// The next frame, which counts in the client's rate of frames.
 async fn next(
     state: &AppState,
     request: &StatelessRequest<DecodeSettings>,
@@ -86,7 +86,7 @@ async fn next(
 /// The picture as a JPEG file whose first segment is a comment with its time.
 fn with_time(VideoPicture { jpeg, time }: VideoPicture) -> Bytes {
     let comment = format!("time={time:.6}");
-    // The length counts itself.
+    // The length of a segment counts its own two bytes.
     let length = u16::try_from(comment.len() + 2).expect("a number is short");
     let begin = jpeg.len().min(START_OF_IMAGE);
     let (start, rest) = jpeg.split_at(begin);
@@ -101,7 +101,7 @@ fn with_time(VideoPicture { jpeg, time }: VideoPicture) -> Bytes {
     .into()
 }
 
-/// The frames after the first. One that cannot be had is the last, and cuts the answer off.
+/// The frames after the first. One that cannot be decoded becomes an error, which cuts the answer off.
 fn rest(
     state: AppState,
     request: StatelessRequest<DecodeSettings>,
