@@ -1,4 +1,4 @@
-//! The problems that the errors of the other modules are.
+//! The problems that the errors of the other modules become.
 
 use super::problem::{Effect, Problem};
 use bagtrack_api::ProblemKind as Kind;
@@ -51,7 +51,7 @@ impl From<IngestError> for Problem {
     }
 }
 
-/// What is said to a file of a type that is not read.
+/// The detail of the problem for a file of a known type that is not read.
 fn unread(name: &str) -> String {
     let cure = match name {
         "HEIC" | "HEIF" => "On an iPhone: Settings, Camera, Formats, Most Compatible.",
@@ -108,7 +108,7 @@ impl From<SnapshotError> for Problem {
     fn from(error: SnapshotError) -> Self {
         let advice = "Send the bytes of GET /sessions/{id}/snapshot unchanged, to a service with the same keys.";
         let detail = match &error {
-            // These bytes are whole: it is this service that cannot go on from them.
+            // The snapshot is intact: it is this service that cannot go on from it.
             SnapshotError::Tracker(TrackerError::Expert(reason)) => format!("{reason}."),
             error => format!("{error}. {advice}"),
         };
@@ -225,7 +225,7 @@ impl From<ActError> for Problem {
                 let detail = format!("This replica cannot go on with the session: {reason}.");
                 Self::new(Kind::StoreUnavailable, detail)
             }
-            // Another version of the program has it.
+            // Another version of the program has written the state.
             ActError::StoredState(
                 error @ (SnapshotError::Version(_) | SnapshotError::Tracker(_)),
             ) => {
@@ -271,7 +271,7 @@ impl Problem {
         let detail = format!(
             "One client may have {most}. Delete sessions that are done, or try again after the time in `Retry-After`."
         );
-        // A session stays for longer than a request or a frame.
+        // A session stays for longer than a request, so trying again at once is no use.
         Self::new(Kind::QuotaExceeded, detail)
             .with_effect(Effect::NothingChanged)
             .retry_after(Duration::from_secs(10))

@@ -14,7 +14,7 @@ pub enum Effect {
     NothingChanged,
     SessionUnchanged,
     NoFrameTracked,
-    /// The lines that were answered before the refusal.
+    /// The frames that got their lines before the refusal count.
     LinesCount,
 }
 
@@ -39,7 +39,7 @@ pub struct Problem {
     expected_frame: Option<u64>,
     /// Which frame of the request is meant, counted from 0.
     index: Option<usize>,
-    /// When trying again makes sense, where it is known better than by the kind.
+    /// After how long trying again makes sense; `None` for the default of the kind.
     retry_after: Option<Duration>,
     /// The cause, for the log only.
     cause: Option<Arc<dyn Error + Send + Sync>>,
@@ -63,7 +63,7 @@ impl Problem {
         Self::new(Kind::MalformedRequest, detail)
     }
 
-    /// It is not told which target is meant, or there is none of this number.
+    /// The request does not say which of the session's `count` targets is meant, or names one that there is not.
     pub fn which_target(count: usize) -> Self {
         let detail = match count {
             1 => "This session has one target; leave out `target`, or say 0.".to_owned(),
@@ -103,7 +103,7 @@ impl Problem {
         Self::new(Kind::Unauthorized, detail)
     }
 
-    /// Something of the service is full.
+    /// A resource of the service is full. `what` is a sentence that names it.
     pub fn saturated(what: &str) -> Self {
         let detail = format!("{what} Send requests to another instance.");
         Self::new(Kind::NotReady, detail)
@@ -131,7 +131,7 @@ impl Problem {
         Self::new(Kind::RequestTooCostly, detail).with_effect(Effect::NoFrameTracked)
     }
 
-    /// The request has more frames than a call with these settings takes, `limit` where that is several.
+    /// The request has more frames than a call with these settings takes: one, or `limit`.
     pub fn too_many_frames<S: Settings>(limit: usize) -> Self {
         let detail = match (S::FRAMES, S::TAKES_VIDEO) {
             (FrameCount::Several, _) => format!(
@@ -155,7 +155,7 @@ impl Problem {
         self
     }
 
-    /// Says what the request left as it was.
+    /// Says what the refused request did, or left as it was.
     pub fn with_effect(self, effect: Effect) -> Self {
         Self {
             effect: Some(effect),
@@ -163,7 +163,7 @@ impl Problem {
         }
     }
 
-    /// Says which of `count` frames is meant.
+    /// Says which of `count` frames is at fault, counted from 0, where none of them is tracked.
     pub fn of_frame(mut self, index: usize, count: usize) -> Self {
         if count > 1 {
             self.detail = format!(
@@ -177,7 +177,7 @@ impl Problem {
         self
     }
 
-    /// Says in which file of the request it is, counted from 0, where those before it count.
+    /// Says which file of the request is at fault, counted from 0, where those before it count.
     pub fn at_frame(self, index: usize) -> Self {
         Self {
             index: Some(index),
@@ -223,7 +223,7 @@ impl Problem {
         self.kind
     }
 
-    /// The status that it is answered with.
+    /// The HTTP status of the answer.
     pub fn status(&self) -> StatusCode {
         StatusCode::from_u16(self.kind.status()).expect("the catalogue holds valid status codes")
     }

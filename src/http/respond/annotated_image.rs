@@ -21,7 +21,7 @@ const MAX_SIDE: u32 = 2048;
 /// Tracks through the only frame of a request, and answers with its picture.
 ///
 /// # Errors
-/// Those of a plain request; also several frames, and no memory for the picture.
+/// Those of a request without a picture; also, the request has several frames, or there is no memory for the picture.
 pub async fn answer_drawn(
     state: &AppState,
     permit: SessionPermit,
@@ -37,7 +37,7 @@ pub async fn answer_drawn(
     next.check_sizes(&state.service.request_limits(), size)?;
     let pixels = u64::from(size.0) * u64::from(size.1);
     let queue = queue.for_size(pixels, file.len());
-    // Before the frame is tracked: what cannot be drawn must not count.
+    // Decoded before the frame is tracked: a frame that cannot be drawn must not count.
     let (file, limits) = (file.clone(), state.config.frame_limits());
     let decode = move |_: &mut WorkMeter| Ok(Picture::decode(&file, &limits, MAX_SIDE)?);
     let picture = state
@@ -45,7 +45,7 @@ pub async fn answer_drawn(
         .run::<_, Problem, _>(queue.clone(), decode)
         .await?;
     let mut charge = state.charge(client);
-    // The pixels, and a file that is no larger but for a little.
+    // Room for the pixels, and for a PNG file that is hardly larger.
     charge.grow(2 * picture.bytes())?;
     next.with_diagnostics = true;
     let mut answered = state.service.advance(permit, queue.clone(), next).await?;
@@ -62,7 +62,7 @@ pub async fn answer_drawn(
     Ok(with_standing(replayed, checkpoint, response))
 }
 
-/// The picture as a file. What was answered before has no particles.
+/// The picture with what is drawn on it, as a PNG file. A replayed answer has no particles.
 fn draw(
     mut picture: Picture,
     estimates: &Estimates,

@@ -27,7 +27,7 @@ pub fn rect(target: tracker::Rect) -> Rect {
     Rect::from([target.x, target.y, target.width, target.height]).rounded()
 }
 
-/// A number to this part of one.
+/// Rounds a number to a multiple of `1 / parts`.
 fn round(value: f64, parts: f64) -> f64 {
     (value * parts).round() / parts
 }
@@ -66,7 +66,7 @@ pub fn answers(all: &[Estimates], warnings: Option<Vec<String>>) -> FrameAnswers
     }
 }
 
-/// The answer to a frame in a stream or as a line; the caller sets what is known beside it.
+/// The answer to a frame in a stream or as a line; the caller sets the other fields.
 pub fn stream_answer(estimates: &Estimates, warnings: Option<Vec<String>>) -> StreamAnswer {
     StreamAnswer {
         answer: answer(estimates, warnings),
@@ -78,7 +78,7 @@ pub fn stream_answer(estimates: &Estimates, warnings: Option<Vec<String>>) -> St
     }
 }
 
-/// What the tracker saw, as it is answered.
+/// The likeliest particles and the votes of the bag's entries, as they are sent.
 pub fn particles(mut seen: Diagnostics) -> Particles {
     seen.particles.sort_by(|a, b| b.1.total_cmp(&a.1));
     let shown = seen.particles.iter().take(MAX_PARTICLES);
@@ -121,7 +121,7 @@ fn description(session: &Session, is_verbose: bool) -> CreatedSession {
     let expires = SystemTime::UNIX_EPOCH + Duration::from_secs(opening.expires);
     let frame = opening.estimates.first().frame;
     let given = opening.estimates.map(|estimate| estimate.target);
-    // The box of a snapshot is the tracker's.
+    // After frame 0, in a session from a snapshot, the box is the tracker's own and needs no warnings.
     let warnings = (frame == 0)
         .then(|| box_warnings(given.as_slice(), session.source_size()))
         .flatten();

@@ -1,4 +1,4 @@
-//! Bodies of answers. Some own their memory: it is charged until the client has taken it.
+//! Bodies of answers. Some hold the charge for their memory until the client has taken them.
 //!
 //! JSON ends with a newline: a shell's prompt then stands on a line of its own.
 
@@ -42,7 +42,7 @@ impl<T: Serialize> IntoResponse for Json<T> {
 /// A value as JSON, whose memory is charged until the client has taken it.
 ///
 /// # Errors
-/// It cannot be written as JSON.
+/// The value cannot be written as JSON.
 pub fn charged_json(value: &impl Serialize, charge: Charge) -> Result<ChargedBody, Problem> {
     let body = json_line(value).map_err(|error| Problem::internal(Arc::new(error)))?;
     Ok(charged_body("application/json", body, charge))
@@ -51,7 +51,7 @@ pub fn charged_json(value: &impl Serialize, charge: Charge) -> Result<ChargedBod
 /// A value as one line of JSON.
 ///
 /// # Errors
-/// It cannot be written as JSON.
+/// The value cannot be written as JSON.
 pub fn json_line(value: &impl Serialize) -> serde_json::Result<Vec<u8>> {
     let mut line = serde_json::to_vec(value)?;
     line.push(b'\n');

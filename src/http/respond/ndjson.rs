@@ -1,6 +1,6 @@
 //! Answers as lines of JSON (NDJSON), each as soon as its frame is tracked.
 //!
-//! Each frame is tracked for itself: those before one that is refused count. The refusal of the first one is the answer
+//! Each frame is tracked by itself: the frames before a refused one count. The refusal of the first frame is the answer
 //! to the request; that of a later one is the last line, a problem document. The next frame is tracked when the line
 //! before it has been taken, so a slow reader holds no lines in memory.
 

@@ -1,8 +1,8 @@
-//! The answer to a video, which keeps a place for as long as its reader takes.
+//! The answer to a video, which keeps a place for decoding until its reader has taken it.
 //!
-//! A reader may keep the service waiting for some time in all. After that its place goes to a video that waits for one,
-//! and the answer is cut off: else a few readers that take a little now and then would hold all places, and one of them
-//! that of all who have its key or its address.
+//! A reader may keep the service waiting for a bounded time in all. After that its answer is cut off as soon as another
+//! video waits for the place. Otherwise a few slow readers could hold all places, and a single one the only place of
+//! all who share its key or its address.
 
 use crate::http::state::AppState;
 use axum::body::{Body, BodyDataStream, Bytes};
@@ -15,10 +15,10 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use tracing::Instrument;
 
-/// How often a reader may use up the time that a request may take.
+/// Most time that a reader may keep the service waiting in all, in work timeouts.
 const READER_PATIENCE: u32 = 4;
 
-/// Gives the answer, whose body holds a place for a video of this client, to a reader that may be slow.
+/// Passes an answer on to a reader that may be slow. Its body holds a place for a video of this client.
 pub fn to_reader(state: &AppState, client: &Client, answer: Response) -> Response {
     let (head, body) = answer.into_parts();
     let (sender, receiver) = mpsc::channel(1);
@@ -41,8 +41,8 @@ pub fn to_reader(state: &AppState, client: &Client, answer: Response) -> Respons
     Response::from_parts(head, Body::from_stream(parts))
 }
 
-/// Sends the parts of an answer, each when the one before was taken, and nothing after the last. An answer that is
-/// given up has no last one.
+/// Sends the parts of an answer, each when the one before was taken, and `None` after the last. Without that `None` the
+/// receiver knows that the answer was given up.
 async fn send(
     mut answer: BodyDataStream,
     sender: mpsc::Sender<Option<Bytes>>,
