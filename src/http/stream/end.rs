@@ -4,9 +4,9 @@ use crate::http::problems::problem::Problem;
 use tokio_tungstenite::tungstenite::protocol::CloseFrame;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 
-/// Close codes from here on are an HTTP status and this.
+/// The close code for a problem is this and the problem's HTTP status.
 const OF_STATUS: u16 = 4000;
-/// Another stream took the place: as a conflict.
+/// Another stream took the session's place. 409 is the HTTP status of a conflict.
 const REPLACED: u16 = OF_STATUS + 409;
 
 /// Why a stream ends.
@@ -19,7 +19,7 @@ pub enum End {
     Shutdown,
     /// A newer stream of the session took its place.
     Replaced,
-    /// There is nothing to go on with: the session has ended, the token is no longer good, or a message is no message.
+    /// The stream cannot go on: the session has ended, the token is no longer good, or a message cannot be read.
     Problem(Problem),
 }
 

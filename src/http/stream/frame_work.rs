@@ -27,7 +27,7 @@ const STORE_RETRY: Duration = Duration::from_millis(250);
 pub struct FrameWork {
     pub state: AppState,
     pub caller: Caller,
-    /// The quotas that they are counted by.
+    /// The quotas against which the frames count.
     pub account: Arc<Account>,
     pub session: Uuid,
     pub place: Arc<StreamPlace>,
@@ -37,7 +37,7 @@ pub struct FrameWork {
 /// What became of a frame.
 #[derive(Debug)]
 pub struct Done {
-    /// Its answer, without what is known when it is sent.
+    /// The frame's answer, without the fields that are set when it is sent.
     pub answer: Result<StreamAnswer, Problem>,
     /// Frames before it that were skipped.
     pub skipped: u64,
@@ -45,12 +45,12 @@ pub struct Done {
 
 impl FrameWork {
     pub fn waiting(&self) -> MutexGuard<'_, Waiting> {
-        // Nothing panics while it is held.
+        // Nothing panics while the lock is held.
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Answers the next frame that waits. It is chosen when there is a place for it, so that the newest can win until
-    /// then. None if none waits.
+    /// Answers the next frame that waits. The frame is chosen only when it has its permits, so that until then a newer
+    /// one can take its place. `None` if none waits.
     pub async fn answer_next(self: Arc<Self>) -> Option<Done> {
         if !self.waiting().next_is_refused() {
             let permits = self.permits().await;
@@ -66,7 +66,7 @@ impl FrameWork {
         Some(Done { answer, skipped })
     }
 
-    /// The permits of a frame. Where there is no place it waits for one, in order of arrival, as long as a plain
+    /// The permits of a frame. Where there is no place, the frame waits for one in order of arrival, as long as a plain
     /// request may.
     async fn permits(&self) -> Result<(SessionPermit, QueuePermit), Problem> {
         let deadline = clock::now() + self.state.config.work_timeout;
@@ -85,7 +85,7 @@ impl FrameWork {
         Ok((permit, queue.for_frames(session.target_count())))
     }
 
-    /// The session, once the store tells it.
+    /// The session. While the store gives no answer, asks again until `deadline`.
     async fn find_until(&self, deadline: Instant) -> Result<Arc<Session>, Problem> {
         loop {
             match self.find().await {
@@ -109,11 +109,11 @@ impl FrameWork {
         caller.find(state, self.session, flow).await
     }
 
-    /// Whether the caller may still use the session, which is there, and whether the stream has its place. Asks the
-    /// store too, while no frame comes.
+    /// Checks, while no frame comes, that the session lives, that the caller may still use it, and that no other stream
+    /// has its place. Asks the store, too.
     ///
     /// # Errors
-    /// The token has ended, or the key; or the session.
+    /// The key, the token or the session has ended, or the store gives no answer.
     pub async fn check_newest(&self) -> Result<(), Problem> {
         let session = self.find().await?;
         let flow = self.account.flow();
@@ -164,7 +164,7 @@ impl FrameWork {
                     });
                 }
                 Err(FramesError::Act(ActError::Store(_))) if clock::now() < deadline => {
-                    // The store may have the frame, and only its answer was lost.
+                    // Perhaps the store took the frame: with its number it is not tracked twice.
                     number = number.or(Some(at.latest_frame() + 1));
                     sleep(STORE_RETRY).await;
                     (session, queue) = self.permits().await?;

@@ -23,7 +23,7 @@ use std::sync::{Arc, Mutex};
 
 /// Most bytes of a frame for each of its pixels: no sensible file has more than the pixels themselves.
 const BYTES_PER_PIXEL: usize = 4;
-/// And for what stands beside the pixels.
+/// Room for the headers of the image file, besides its pixels.
 const BESIDE_BYTES: usize = 256 << 10;
 
 /// Send frames over a WebSocket
@@ -82,7 +82,7 @@ pub struct StreamRequest {
     settings: StreamSettings,
     session: Arc<Session>,
     upgrade: Upgrade,
-    /// The connection that it takes over.
+    /// The connection that the stream takes over.
     connection: ConnectionHold,
     caller: Caller,
     client: Client,
@@ -138,9 +138,8 @@ fn max_message_bytes(state: &AppState, session: &Session) -> usize {
     usual.min(state.config.max_frame_bytes)
 }
 
-/// Finds where the session stands, and takes its place for a stream. The stream before this one tracks no further
-/// frame, nor does one at another replica. Waits for the frame at work, of that stream too. A stream that cannot begin
-/// leaves the one before it alone.
+/// Finds where the session stands, and takes the session's place for a stream. Waits for the frame at work. An older
+/// stream, here or at another replica, tracks no further frame; a stream that cannot begin leaves the older one alone.
 async fn begin(
     state: &AppState,
     session: &Arc<Session>,

@@ -8,16 +8,16 @@ use bagtrack_sessions::GivenBox;
 /// Most bytes of a text message.
 pub const MAX_TEXT_BYTES: usize = 4096;
 
-/// The correction, where there is one.
+/// The corrected box that the client gave with a frame, if any.
 pub fn correction(header: &FrameHeader) -> Option<GivenBox> {
     let (target, to) = (header.target, header.rect.map(rect)?);
     Some(GivenBox { target, to })
 }
 
-/// What `later` says of a frame, and what `earlier` said beside it.
+/// What two text messages say of one frame. Where both have a field, `later` counts.
 ///
 /// # Errors
-/// They are about two targets.
+/// The messages are about two targets.
 pub fn merged(earlier: FrameHeader, later: FrameHeader) -> Result<FrameHeader, Problem> {
     let detail = "The texts before this frame name two targets; a frame takes one.";
     let merged = earlier.and(later);
@@ -34,7 +34,7 @@ pub fn too_long() -> Problem {
 /// Reads a text message.
 ///
 /// # Errors
-/// It is no such JSON.
+/// The text is not the JSON of a [`FrameHeader`].
 pub fn parse(text: &str) -> Result<FrameHeader, Problem> {
     serde_json::from_str(text).map_err(|error| {
         let detail = format!(

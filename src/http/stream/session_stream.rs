@@ -39,14 +39,14 @@ pub struct Stand {
 }
 
 pub struct SessionStream {
-    /// What its frames have in common.
+    /// What the stream's frames have in common.
     pub work: Arc<FrameWork>,
-    /// The connection that it took over.
+    /// The connection that the stream took over.
     pub connection: ConnectionHold,
     /// The place among the client's streams.
     pub permit: Charge,
     pub stand: Stand,
-    /// What names the request that opened it, for problems.
+    /// The path and the id of the request that opened the stream, for problem documents.
     pub instance: Instance,
 }
 
@@ -98,7 +98,7 @@ impl SessionStream {
         let mut answering: Option<Answering> = None;
         let period = work.state.config.limits.ping_interval;
         let mut pings = interval_at(clock::now() + period, period);
-        // A client is silent for the whole of a period, also after one that took long here.
+        // After a late tick, too, a client has a whole period to answer the ping.
         pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let (mut is_heard, mut is_ending) = (true, false);
         loop {
@@ -112,7 +112,7 @@ impl SessionStream {
             if !may_come {
                 socket.get_mut().pause();
             }
-            // In this order a client that sends all the time holds up nothing.
+            // Tried in this order, so that a client that sends all the time holds up nothing else.
             tokio::select! {
                 biased;
                 () = self.connection.ending(), if !is_ending => is_ending = true,
@@ -131,7 +131,8 @@ impl SessionStream {
                     }
                 }
                 _ = pings.tick() => {
-                    // A frame at work has the session, and asks the store itself. It stands still in here.
+                    // A frame at work has the session, and asks the store itself. It is not polled in this branch, so
+                    // waiting for the session would never end.
                     if answering.is_none() && let Some(end) = self.check_newest().await {
                         return Ok(end);
                     }
@@ -147,7 +148,7 @@ impl SessionStream {
         }
     }
 
-    /// Whether the stream ends, since its session has, its token, or its place.
+    /// Why the stream ends, if its session, its key or token, or its place has ended.
     async fn check_newest(&self) -> Option<End> {
         match self.work.check_newest().await {
             Err(problem) if ends_stream(problem.kind()) => Some(End::Problem(problem)),
@@ -155,7 +156,7 @@ impl SessionStream {
         }
     }
 
-    /// Tells the number of the next frame, and the stored answers that were asked for.
+    /// Sends the number of the next frame, and the stored answers that were asked for.
     async fn greet(&mut self, socket: &mut Socket) -> Result<(), Error> {
         let next = self.stand.next;
         self.send(socket, &Hello { next }).await?;
@@ -227,7 +228,7 @@ impl SessionStream {
             Err(problem) if ends_stream(problem.kind()) => return Ok(Some(End::Problem(problem))),
             Err(problem) => {
                 counts.refused += 1;
-                // A client sends thousands a second. The end of the stream tells how many there were.
+                // Only the first is logged: a client may cause thousands a second.
                 let document = match counts.refused {
                     1 => self.instance.report(&self.work.state, &problem),
                     _ => self.instance.count(&self.work.state, &problem),
@@ -238,7 +239,7 @@ impl SessionStream {
         Ok(None)
     }
 
-    /// A frame, which owns the memory that it takes.
+    /// A frame, whose file holds the charge for its memory.
     fn arrived(&self, header: FrameHeader, file: Bytes, charge: Charge) -> ArrivedFrame {
         let received = &self.work.state.metrics.received_bytes;
         received.increment(file.len() as u64);
@@ -258,7 +259,8 @@ impl SessionStream {
         self.send(socket, &document).await
     }
 
-    /// Tells the client why, and waits until it has closed too: else its system might throw away what it has not read.
+    /// Tells the client why the stream ends, and waits until the client has closed it, too: otherwise the client's
+    /// system might throw away what the client has not read.
     async fn close(self, mut socket: Socket, end: End) {
         if let End::Problem(problem) = &end {
             let _ = self.send_problem(&mut socket, problem).await;
@@ -281,10 +283,10 @@ impl SessionStream {
     }
 }
 
-/// What it means that a message cannot be read.
+/// Why the stream ends when a message cannot be read.
 fn unreadable(error: &Error) -> End {
     let problem = match error {
-        // Its connection ends without a word before.
+        // The client's connection ended without a close frame.
         Error::Protocol(ProtocolError::ResetWithoutClosingHandshake) => return End::Gone,
         Error::Io(error) => match error.get_ref() {
             Some(cause) if cause.is::<MessageTooSlow>() => Problem::body_timeout(),
@@ -307,7 +309,7 @@ fn ends_stream(kind: Kind) -> bool {
     )
 }
 
-/// What becomes of the frame at work; for ever where there is none.
+/// Waits for the frame at work; without one, for ever.
 async fn wait_for(answering: &mut Option<Answering>) -> Option<Done> {
     match answering {
         Some(answering) => answering.await,

@@ -20,7 +20,7 @@ use tracing::Instrument;
 
 /// The protocol that a client may offer. A page has to offer one beside its token.
 const PROTOCOL: &str = "bagtrack";
-/// Most bytes that the library reads at once. It keeps room for so much, and for a fragment.
+/// Most bytes that tungstenite reads at once. It keeps room for so much, and for a fragment.
 const READ_BYTES: usize = 16 << 10;
 /// Most bytes of answers that wait to be written. They are written as soon as there are any.
 const WRITE_BYTES: usize = 64 << 10;
@@ -31,9 +31,9 @@ pub type Socket = WebSocketStream<Fragments<ConnectionIo>>;
 /// What the messages of a stream may be.
 #[derive(Debug)]
 pub struct MessageLimits {
-    /// Most bytes of one.
+    /// Most bytes of a message.
     pub max_bytes: usize,
-    /// What their memory is charged to: of all clients, and of this one.
+    /// The budgets to which the messages' memory is charged: of all clients, and of this one.
     pub budgets: [Budget; 2],
     /// How slowly they may come, and how fast.
     pub rates: Rates,
@@ -48,10 +48,10 @@ pub struct Upgrade {
 }
 
 impl Upgrade {
-    /// Of a request.
+    /// The handshake of a request.
     ///
     /// # Errors
-    /// It is no handshake of a WebSocket.
+    /// The request is no handshake of a WebSocket.
     pub async fn of(parts: &mut Parts) -> Result<Self, Problem> {
         let connection = parts.extensions.get::<OnUpgrade>().cloned();
         let key = parts.headers.get(SEC_WEBSOCKET_KEY).cloned();
@@ -70,7 +70,7 @@ impl Upgrade {
         })
     }
 
-    /// The answer. After it `serve` gets the socket, in the span of this call.
+    /// The answer 101. Once it is sent, a task in the span of this call gives `serve` the socket.
     pub fn answer<F, S>(self, limits: MessageLimits, serve: F) -> Response
     where
         F: FnOnce(Socket) -> S + Send + 'static,

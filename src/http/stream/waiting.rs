@@ -5,8 +5,8 @@ use axum::body::Bytes;
 use bagtrack_api::FrameHeader;
 use std::collections::VecDeque;
 
-/// Frames that wait behind the one at work. The next one is there when that is done; more would only wait here in place
-/// of in the network.
+/// Most frames that wait behind the one at work, so that the next one is there when it is done. More would only wait
+/// here instead of in the network.
 const MAX_WAITING: usize = 2;
 
 /// A frame that has come.
@@ -18,12 +18,12 @@ pub struct Arrived {
     pub skipped: u64,
 }
 
-/// A frame with what was said of it.
+/// A frame with what the client said of it.
 #[derive(Debug)]
 pub struct ArrivedFrame {
-    /// What was said of it.
+    /// What the text messages before the frame said of it.
     pub header: FrameHeader,
-    /// The file, with its memory.
+    /// The file, which holds the charge for its memory.
     pub file: Bytes,
 }
 
@@ -43,7 +43,7 @@ pub struct Waiting {
 }
 
 impl Waiting {
-    /// None yet. Where the newest wins, the others are skipped.
+    /// No frames yet. Where the newest wins, the frames before it are skipped.
     pub fn new(newest_wins: bool) -> Self {
         Self {
             frames: VecDeque::new(),
@@ -56,7 +56,7 @@ impl Waiting {
         self.newest_wins
     }
 
-    /// Whether no more can come.
+    /// Whether no further frame is to be read.
     pub fn is_full(&self) -> bool {
         !self.newest_wins && self.frames.len() >= MAX_WAITING
     }
@@ -66,7 +66,7 @@ impl Waiting {
         self.frames.is_empty()
     }
 
-    /// A frame has come.
+    /// Adds a frame. Where the newest wins, it replaces the frames that wait; a correction, only if it is one itself.
     pub fn push(&mut self, frame: Result<ArrivedFrame, Problem>) {
         let mut arrived = Arrived { frame, skipped: 0 };
         if self.newest_wins {
