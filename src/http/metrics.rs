@@ -35,7 +35,7 @@ pub struct Metrics {
     pub received_bytes: Counter,
     /// Bytes of response bodies.
     pub sent_bytes: Counter,
-    /// Idle connections that were closed for others.
+    /// Idle connections that were closed to make room for others.
     pub shed_connections: Counter,
     pub tracking: TrackingMetrics,
 }
@@ -120,7 +120,7 @@ impl Metrics {
         self.recorder.handle().render()
     }
 
-    /// Sums up what was measured since the last time.
+    /// Sums up the measurements since the last call.
     pub fn upkeep(&self) {
         self.recorder.handle().run_upkeep();
     }
@@ -165,7 +165,7 @@ fn tracking(make: &Maker) -> TrackingMetrics {
     }
 }
 
-/// Where metrics come from; Prometheus does not show it.
+/// Where metrics come from. The recorder asks for this, and Prometheus does not show it.
 const METADATA: Metadata<'static> = Metadata::new(module_path!(), Level::INFO, None);
 
 /// Makes and describes metrics.
@@ -191,7 +191,7 @@ impl Maker<'_> {
             .register_gauge(&Key::from_static_name(name), &METADATA)
     }
 
-    /// A counter with these labels: the one that is there, or a new one.
+    /// The counter with these labels; a new one at their first use.
     fn find_counter(&self, name: &'static str, labels: Vec<Label>) -> Counter {
         self.0
             .register_counter(&Key::from_parts(name, labels), &METADATA)

@@ -1,8 +1,8 @@
 //! The HTTP interface: one file for each resource, and the middleware that every request passes through.
 //!
 //! In: connections. Out: JSON answers, or problem documents (RFC 9457). A request goes through the layers of the
-//! router, into an extractor that reads its upload, into its handler, which works on a session with a worker thread,
-//! and back.
+//! router, into an extractor that reads its upload, and into its handler, which has a worker thread work on a session.
+//! The answer goes back through the layers.
 //!
 //! What can go wrong: clients send headers or bodies slowly, or too much of them, or more work than the cores can do
 //! ([`Config`] names a bound for each); a connection breaks after a frame was taken (a numbered frame can be sent

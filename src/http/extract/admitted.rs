@@ -158,8 +158,8 @@ impl<S: Settings> Upload<S> {
     /// work has ended, and the files hold the charge for their memory.
     ///
     /// # Errors
-    /// The request is not let in, the body cannot be read, it has too few or too many frames, a setting is wrong, the
-    /// queue is full, or the client has sent too many frames lately.
+    /// The request is not let in, the body cannot be read, the request has too few or too many frames, a setting is
+    /// wrong, the queue is full, or the client has sent too many frames lately.
     pub async fn read(
         state: &AppState,
         texts: Texts,

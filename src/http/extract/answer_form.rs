@@ -16,7 +16,7 @@ pub enum AnswerForm {
 }
 
 impl AnswerForm {
-    /// The form that the header `Accept` likes best; JSON where it names none of them.
+    /// The form with the highest quality in the header `Accept`, the first of equals; JSON where it names no form.
     pub fn of(headers: &HeaderMap) -> Self {
         let mut best = (0.0, Self::Json);
         for (name, quality) in qualities(headers, ACCEPT) {
@@ -34,11 +34,11 @@ impl AnswerForm {
     }
 }
 
-/// Most items of a list in a header that are looked at. Browsers send some five.
+/// Most items of a header's list that are read. Browsers send about five.
 pub const MAX_ITEMS: usize = 64;
 
-/// What a client takes, by a header that is a list: names in lower case, and their qualities (RFC 9110, section
-/// 12.4.2).
+/// The items of a header like `Accept`: their names in lower case, and their qualities, 1 where none is given (RFC
+/// 9110, section 12.4.2).
 pub fn qualities(headers: &HeaderMap, name: HeaderName) -> impl Iterator<Item = (String, f32)> {
     let values = headers.get_all(name).into_iter();
     let texts = values.filter_map(|value| value.to_str().ok());

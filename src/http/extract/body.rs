@@ -12,10 +12,10 @@ use futures_util::StreamExt;
 use http_body_util::{BodyExt, LengthLimitError, Limited};
 use std::error::Error;
 
-/// Bytes that a buffer begins with, where the body is not smaller.
+/// Bytes of a buffer's first capacity, where the body is not smaller.
 const FIRST_BYTES: usize = 64 << 10;
 
-/// Most bytes of the head of a form's part, and of what stands before the first part.
+/// Most bytes of the head of a form's part, and of the text before the first part.
 pub(super) const MAX_HEAD_BYTES: usize = 16 << 10;
 
 /// The head of a part does not end.
@@ -46,7 +46,7 @@ impl<'a> Buffer<'a> {
         }
     }
 
-    /// Adds a piece. The buffer doubles where it is too small.
+    /// Adds a piece. Where the buffer is too small, its capacity doubles.
     ///
     /// # Errors
     /// The memory budget has no room for the piece.

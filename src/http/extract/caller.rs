@@ -55,7 +55,7 @@ impl Caller {
         self.only.is_none_or(|only| only.id == id)
     }
 
-    /// The owner's live session of this id, if it may be used.
+    /// The owner's live session of this id.
     ///
     /// # Errors
     /// The owner has no such session, the session token is for another one, or the store gives no answer.
@@ -113,7 +113,7 @@ impl<S: Send + Sync> FromRequestParts<S> for SessionPath {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
-        // Bytes that are not UTF-8 are the id of no session.
+        // A path that is not UTF-8 is answered like an unknown id.
         let caller = Caller::from_request_parts(parts, state).await?;
         let path = Path::<String>::from_request_parts(parts, state).await;
         let client = client_of(parts);
@@ -123,7 +123,7 @@ impl<S: Send + Sync> FromRequestParts<S> for SessionPath {
 }
 
 impl SessionPath {
-    /// The caller's live session of this id. Text that is not an id is the id of no session.
+    /// The caller's live session of this id. Text that is no UUID is answered like an unknown id.
     pub async fn find(&self, state: &AppState) -> Result<Arc<Session>, Problem> {
         let flow = state.flow(&self.client);
         self.caller.find(state, self.id()?, flow).await

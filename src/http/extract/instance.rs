@@ -16,7 +16,7 @@ use std::convert::Infallible;
 pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 const MAX_ID_BYTES: usize = 64;
 
-/// The path of a request with the base path, where a middleware has taken that off.
+/// The whole path of a request, where a middleware has taken the base path off its URI.
 #[derive(Debug, Clone)]
 pub struct ClientPath(pub String);
 
@@ -74,8 +74,8 @@ impl<S: Sync> FromRequestParts<S> for Instance {
     }
 }
 
-/// Gives a request an id, in its header, where it has none or one that is too long or has other characters than ids
-/// need: ids are logged and sent back. Returns the id.
+/// Returns the request id in the headers. Where there is none, or one that is too long or has characters other than
+/// ASCII letters, digits and `-_.:`, sets a new one first: ids are logged and sent back.
 pub fn set_request_id(headers: &mut HeaderMap) -> HeaderValue {
     let is_usable = |id: &&HeaderValue| {
         let is_allowed = |byte: &u8| byte.is_ascii_alphanumeric() || b"-_.:".contains(byte);

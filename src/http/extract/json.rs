@@ -21,7 +21,7 @@ pub(super) const DECODED_PER_BYTE: usize = 2;
 /// Least processor time of parsing a byte, in nanoseconds: it tells before that a large body is slow to parse.
 const NANOS_PER_BYTE: u64 = 2;
 
-/// Least processor time of parsing so many bytes.
+/// Least processor time of parsing this number of bytes.
 pub(super) fn least_time(bytes: usize) -> Duration {
     Duration::from_nanos((bytes as u64).saturating_mul(NANOS_PER_BYTE))
 }
@@ -114,7 +114,7 @@ pub(super) fn read<S: Settings>(
 }
 
 fn frames<S: Settings>(value: &RawValue, max_files: usize) -> Result<Vec<Cow<'_, str>>, Problem> {
-    // Two quotes a string: base64 has none of its own.
+    // Each string has two quotes, and base64 has no quotes of its own.
     let quotes = value.get().bytes().filter(|byte| *byte == b'"').count();
     if quotes > 2 * max_files {
         return Err(Problem::too_many_frames::<S>(max_files));

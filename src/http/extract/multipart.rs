@@ -1,4 +1,4 @@
-//! Multipart uploads: `frame` parts are files, and `snapshot` is one where a route takes it; all others are settings.
+//! Multipart uploads: `frame` and, where a route takes one, `snapshot` are files; all other parts are settings.
 //!
 //! Whenever a piece of the body comes, the parser searches all bytes that it has again (docs/upstream/multer.md). So
 //! small pieces are gathered, the parser gets them only when it can do nothing with what it has, and the head of a part
@@ -25,7 +25,7 @@ use std::task::{Context, Poll};
 /// beginning of a boundary are searched again whenever a piece comes.
 const MAX_TYPE_BYTES: usize = 256;
 
-/// Pieces of fewer bytes are gathered, as far as they have come.
+/// Pieces of fewer bytes that have arrived are put together.
 const ENOUGH_BYTES: usize = 8 << 10;
 
 /// How far the parser is.
@@ -53,7 +53,7 @@ struct Stepwise {
 }
 
 impl Stepwise {
-    /// What has come, up to [`ENOUGH_BYTES`] or one piece; nothing at the end.
+    /// The bytes that have come: small pieces together up to [`ENOUGH_BYTES`], or a larger one; `None` at the end.
     fn poll_gathered(&mut self, cx: &mut Context<'_>) -> Poll<Option<Result<Bytes, axum::Error>>> {
         let mut gathered = BytesMut::new();
         while !self.has_ended && gathered.len() < ENOUGH_BYTES {
@@ -100,7 +100,7 @@ impl HttpBody for Stepwise {
 }
 
 /// Adds the parts of a multipart body to `fields`: at most `max_files` files. The router limits all bodies to
-/// `max_bytes` bytes. What is kept is charged to `charge`.
+/// `max_bytes` bytes. The bytes that are kept are charged to `charge`.
 pub(super) async fn read<S: Settings>(
     request: Request,
     max_bytes: usize,

@@ -1,6 +1,6 @@
 //! The frames of an uploaded video, as an `ffmpeg` process decodes them. The process has a [place](VideoPlace).
 //!
-//! A client has one place at a time, so that another client gets the next.
+//! A client has one place at a time, so that the next place is left to another client.
 
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
@@ -24,7 +24,7 @@ const SMALLER: &str =
     "Send it smaller: `ffmpeg -i VIDEO -vf scale=1920:-2 smaller.mp4` makes it so.";
 const CODECS: &str = "Send H.264, H.265, VP8, VP9, AV1, MPEG-4, H.263 or Motion JPEG: `ffmpeg -i VIDEO clip.mp4` makes one.";
 
-/// The frames of a video. Its process ends when this is dropped.
+/// The frames of a video. The process that decodes it ends when this is dropped.
 #[derive(Debug)]
 pub struct VideoFrames {
     pictures: mpsc::Receiver<Result<VideoPicture, VideoError>>,
@@ -205,7 +205,7 @@ impl VideoPlace {
     /// may take the processor time of as many requests as posts of its frames would need.
     ///
     /// # Errors
-    /// The client's other video, or those of others, take longer; or the queue is full after the wait.
+    /// No place is free in time, of the client's own or of all; or the queue is full after the wait.
     pub async fn take(
         state: &AppState,
         client: &Client,

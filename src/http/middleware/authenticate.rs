@@ -42,7 +42,7 @@ pub async fn authenticate(state: &AppState, request: &mut Request) -> Result<(),
     }
 }
 
-/// Asks for the key of the metrics, where there is one, and else does as [`authenticate`].
+/// Asks for the key of the metrics, where the settings have one. Otherwise does as [`authenticate`].
 ///
 /// # Errors
 /// The request has no valid key or token: the error is the answer 401.

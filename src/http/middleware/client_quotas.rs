@@ -1,4 +1,4 @@
-//! Which client a request is from, how often it may ask, and what it is told of its quotas.
+//! Which client a request is from, how often the client may ask, and the headers that tell its quotas.
 //!
 //! Requests that take no turn at the workers have a rate: pages, states of sessions, refused requests. Network threads
 //! do most of them, so a client that asks as fast as it can would take these threads from the others. All GET requests

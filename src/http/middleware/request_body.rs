@@ -1,4 +1,4 @@
-//! The body of a request: the pace at which it has to come, and what becomes of one that was refused.
+//! The body of a request: the pace at which it has to come, and what becomes of a body that was refused.
 //!
 //! A body has a least rate: otherwise a client that sends a byte now and then would hold its connection and its
 //! session's place until the deadline of the body. Each byte extends the deadline, so that a video may take its time.
@@ -21,7 +21,7 @@ use std::pin::Pin;
 use std::task::{Context, Poll};
 use tokio::sync::oneshot;
 
-/// Gives up on a body that comes more slowly than it may.
+/// Makes the body fail with [`TooSlow`] when it comes more slowly than it may.
 pub fn pace_body(config: &Config, request: Request) -> Request {
     request.map(|body| match body.is_end_stream() {
         true => body,
@@ -112,7 +112,7 @@ pub async fn drain_refused(
     response
 }
 
-/// A body that sends its rest back when it is dropped.
+/// A body that, when it is dropped, sends what was not read back to [`drain_refused`].
 struct Returning {
     body: Option<Body>,
     polled: bool,

@@ -98,7 +98,7 @@ fn logged(path: &str) -> String {
     shown.collect::<Vec<String>>().join("/")
 }
 
-/// The beginning of what may be an id.
+/// The beginning of a text that may be an id.
 fn shortened(text: &str) -> String {
     match text.char_indices().nth(SHOWN_OF_ID) {
         Some((end, _)) => format!("{}…", &text[..end]),

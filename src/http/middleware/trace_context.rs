@@ -1,7 +1,7 @@
 //! `traceparent` (W3C Trace Context): the trace of the client goes on here, or a new one begins.
 //!
-//! The answer has the header with the trace and the span of this request, so that a client finds it in the log and
-//! where spans are exported to (feature `otel`).
+//! The answer has the header with the trace and the span of this request, so that a client finds the request in the
+//! log, and among the exported spans (feature `otel`).
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use bagtrack_sessions::random::random_range;
@@ -85,7 +85,7 @@ fn hexadecimal(field: &str, digits: usize) -> Option<u128> {
         .flatten()
 }
 
-/// What OpenTelemetry is told of the span of a request. Where nothing is exported this does nothing.
+/// Tells OpenTelemetry of the span of a request. Does nothing where no spans are exported.
 #[cfg(feature = "otel")]
 pub mod exported {
     use super::TraceContext;

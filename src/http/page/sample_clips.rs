@@ -95,7 +95,7 @@ fn encode(clip: &Clip, index: u32) -> ImageResult<Vec<u8>> {
     Format::Jpeg.encode(&clip.draw(index))
 }
 
-/// Draws the clips' first frames in the background, once. No service waits for it, at its start or at its end.
+/// Draws the clips' first frames in the background, once. No service waits for the thread, at its start or at its end.
 pub fn draw_ahead() {
     static BEGUN: Once = Once::new();
     BEGUN.call_once(|| {

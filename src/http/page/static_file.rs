@@ -1,4 +1,4 @@
-//! Files that are part of the program, sent with gzip to clients that take it.
+//! Files that are part of the program, compressed with gzip for clients that take that.
 //!
 //! Each file is compressed once, when a client first takes it with gzip, and then kept. An entity tag tells whether a
 //! browser has the file already. The tag is weak, since the plain and the compressed file share it.
@@ -79,7 +79,7 @@ impl StaticFile {
             .any(|tag| tag == "*" || tag.strip_prefix("W/").unwrap_or(tag) == self.tag)
     }
 
-    /// The file with gzip, where that is smaller.
+    /// The file compressed with gzip; `None` where that is no smaller.
     async fn compressed(self: &Arc<Self>) -> Option<Bytes> {
         if let Some(gzip) = self.gzip.get() {
             return gzip.clone();

@@ -20,7 +20,7 @@ const INDEX: &str = "index.html";
 /// A file of the page: its name and bytes.
 type File = (&'static str, &'static [u8]);
 
-/// The files of a folder of this repository.
+/// Embeds the named files of a folder of this repository.
 macro_rules! files {
     ($folder:literal: $($name:literal),+) => {
         &[$(($name, include_bytes!(concat!("../../../", $folder, $name)))),+]

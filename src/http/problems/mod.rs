@@ -8,7 +8,7 @@
 //!
 //! The kinds make one catalogue. [The page](page) that the types of problems lead to is made from it, too.
 //!
-//! What can go wrong: a cause that reaches the client tells more than it should. So the document has no field for it.
+//! What can go wrong: a cause in an answer tells the client too much. So the document has no field for causes.
 
 mod from_errors;
 pub mod page;

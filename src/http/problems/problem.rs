@@ -58,7 +58,7 @@ impl Problem {
         }
     }
 
-    /// The request cannot be read; `detail` says why and what would do.
+    /// The request cannot be read. `detail` says why, and what to send instead.
     pub fn malformed(detail: impl Into<String>) -> Self {
         Self::new(Kind::MalformedRequest, detail)
     }
@@ -122,7 +122,7 @@ impl Problem {
         Self::new(Kind::BodyTooLarge, detail)
     }
 
-    /// The frames of the request have more pixels than those of one request may.
+    /// The frames of the request have more pixels than one request may have.
     pub fn too_many_pixels(pixels: u64, limit: u64) -> Self {
         let detail = format!(
             "The frames of this request have {pixels} pixels together; at most {limit} are taken. Send fewer frames \
@@ -209,7 +209,7 @@ impl Problem {
         self
     }
 
-    /// Seconds after which trying again makes sense, where it does; at least 1.
+    /// Seconds after which trying again makes sense, at least 1; `None` where it never does.
     pub fn retry_seconds(&self) -> Option<u32> {
         let known = self
             .retry_after

@@ -149,7 +149,7 @@ fn range(settings: &TrackSettings) -> Result<VideoRange, Problem> {
     })
 }
 
-/// What a new track begins with.
+/// The boxes and the parameters with which a new track begins.
 fn begin(settings: TrackSettings) -> Result<(Boxes, Box<Params>), Problem> {
     if settings.target.is_some() {
         let detail = "`target` says which one `box` corrects; without a snapshot leave it out.";

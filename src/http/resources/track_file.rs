@@ -11,7 +11,7 @@ use bagtrack_formats::{Clip, Columns, FileFormat, Row};
 use bagtrack_sessions::{Charge, Selection, WorkMeter};
 use std::sync::Arc;
 
-/// Bytes that a row and its part of the file take at most.
+/// Most bytes that a row and its part of the file take.
 const ROW_BYTES: usize = 1024;
 /// Frames a second, where neither the caller nor the video tells.
 const USUAL_RATE: f64 = 25.0;
@@ -54,7 +54,7 @@ impl Seen {
 }
 
 impl TrackFile {
-    /// The file that is asked for; none where the answers are to come frame by frame.
+    /// The file that is asked for; `None` without `format`, where each frame is answered by a line.
     ///
     /// # Errors
     /// The format cannot hold what is asked for, there are more names than targets, or `names`, `video_name` or `rate`

@@ -98,7 +98,7 @@ impl VideoTrack {
 pub struct VideoAnswers {
     pub video: VideoTrack,
     pub selection: Selection<Arc<Answer>>,
-    /// Why no further frame is tracked, once there is none.
+    /// Why no further frame is tracked; `None` while frames are.
     pub end: Option<End>,
 }
 

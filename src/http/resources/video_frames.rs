@@ -1,4 +1,4 @@
-//! `POST /frames`: the frames of a video as pictures, for who cannot decode it.
+//! `POST /frames`: the frames of a video as pictures, for clients that cannot decode it.
 
 use crate::http::extract::admitted::StatelessRequest;
 use crate::http::extract::video_frames::{VideoFrames, VideoPlace, count_frame};

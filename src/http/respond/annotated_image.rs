@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 /// The header that has the answer as JSON.
 pub const ANSWER: HeaderName = HeaderName::from_static(headers::ANSWER);
-/// The longer side of a picture at most, in pixels. It bounds the memory that a drawn answer takes.
+/// Most pixels of a picture's longer side. This bounds the memory of a drawn answer.
 const MAX_SIDE: u32 = 2048;
 
 /// Tracks through the only frame of a request, and answers with its picture.

@@ -1,4 +1,4 @@
-//! Answers as they are sent: of what the tracker says, of a session that was opened, and the header fields beside them.
+//! Answers as they are sent: the tracker's estimates, sessions that were opened, and the header fields beside them.
 
 use super::body::Json;
 use axum::http::header::LOCATION;
@@ -22,7 +22,7 @@ pub const CHECKPOINT: HeaderName = HeaderName::from_static(headers::CHECKPOINT);
 const TARGET_BYTES: usize = 256;
 const MAX_PARTICLES: usize = 200;
 
-/// A box as it is answered.
+/// A box of the tracker, rounded for an answer.
 pub fn rect(target: tracker::Rect) -> Rect {
     Rect::from([target.x, target.y, target.width, target.height]).rounded()
 }
@@ -44,7 +44,7 @@ fn target(estimate: &Estimate) -> TargetView {
     }
 }
 
-/// The answer to one frame, with what may be wrong with the box that was given.
+/// The answer to one frame. `warnings` say what may be wrong with the box that was given.
 pub fn answer(estimates: &Estimates, warnings: Option<Vec<String>>) -> Answer {
     Answer {
         frame: estimates.first().frame,
@@ -57,7 +57,7 @@ pub fn answer(estimates: &Estimates, warnings: Option<Vec<String>>) -> Answer {
     }
 }
 
-/// The answers to all frames of a request, which has at least one, with what may be wrong with the box that was given.
+/// The answers to all frames of a request, at least one. `warnings` say what may be wrong with the box that was given.
 pub fn answers(all: &[Estimates], warnings: Option<Vec<String>>) -> FrameAnswers {
     let several = || all.iter().map(|one| answer(one, None)).collect();
     FrameAnswers {
@@ -93,7 +93,7 @@ pub fn particles(mut seen: Diagnostics) -> Particles {
     }
 }
 
-/// Bytes that the answers to so many frames take at most, as values and as JSON, in a session with so many targets.
+/// Most bytes of the answers to `frames` frames, as values and as JSON, in a session with `targets` targets.
 pub fn answer_bytes(frames: usize, targets: usize) -> usize {
     // The first target stands beside the list, and the last answer beside the list of answers.
     (frames + 1) * (targets + 1) * TARGET_BYTES

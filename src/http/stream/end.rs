@@ -24,7 +24,7 @@ pub enum End {
 }
 
 impl End {
-    /// What the log says.
+    /// The reason, for the log and the close frame.
     pub fn reason(&self) -> &'static str {
         match self {
             Self::Closed => "the client closed it",

@@ -128,7 +128,7 @@ fn message_limits(state: &AppState, session: &Session, account: &Account) -> Mes
     }
 }
 
-/// Most bytes of a message: of one frame.
+/// Most bytes of a message, which has one frame.
 fn max_message_bytes(state: &AppState, session: &Session) -> usize {
     let (width, height) = session.source_size();
     let pixels = usize::try_from(u64::from(width) * u64::from(height)).unwrap_or(usize::MAX);

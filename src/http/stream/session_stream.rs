@@ -86,7 +86,7 @@ impl SessionStream {
     async fn serve(&mut self, socket: &mut Socket, counts: &mut Counts) -> End {
         match self.exchange(socket, counts).await {
             Ok(end) => end,
-            // Whoever cannot be written to has gone.
+            // An error here means that the client cannot be written to.
             Err(_) => End::Gone,
         }
     }
@@ -136,7 +136,7 @@ impl SessionStream {
                     if answering.is_none() && let Some(end) = self.check_newest().await {
                         return Ok(end);
                     }
-                    // While frames wait nothing is read, so nothing can be heard.
+                    // While nothing is read, nothing can be heard.
                     is_heard |= socket.get_mut().take_heard();
                     if !is_heard && may_come {
                         return Ok(End::Silent);

@@ -18,28 +18,28 @@ use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 use tracing::Instrument;
 
-/// The protocol that a client may offer. A page has to offer one beside its token.
+/// The protocol that a client may offer. A page has to offer this beside its token.
 const PROTOCOL: &str = "bagtrack";
 /// Most bytes that tungstenite reads at once. It keeps room for so much, and for a fragment.
 const READ_BYTES: usize = 16 << 10;
-/// Most bytes of answers that wait to be written. They are written as soon as there are any.
+/// Most bytes of answers that wait to be written. Each answer is written as soon as it is there.
 const WRITE_BYTES: usize = 64 << 10;
 
 /// A WebSocket whose messages are charged as they arrive. Its buffers take the place of those that its connection had.
 pub type Socket = WebSocketStream<Fragments<ConnectionIo>>;
 
-/// What the messages of a stream may be.
+/// The limits of a stream's messages.
 #[derive(Debug)]
 pub struct MessageLimits {
     /// Most bytes of a message.
     pub max_bytes: usize,
     /// The budgets to which the messages' memory is charged: of all clients, and of this one.
     pub budgets: [Budget; 2],
-    /// How slowly they may come, and how fast.
+    /// How slowly messages may come, and how fast.
     pub rates: Rates,
 }
 
-/// A handshake that can be answered.
+/// A valid handshake, not yet answered.
 #[derive(Debug)]
 pub struct Upgrade {
     connection: OnUpgrade,

@@ -28,7 +28,7 @@ pub struct ArrivedFrame {
 }
 
 impl Arrived {
-    /// A correction is never skipped for a frame without one.
+    /// Whether the frame has a corrected box: then no frame without one replaces it.
     fn is_correction(&self) -> bool {
         let frame = self.frame.as_ref();
         frame.is_ok_and(|frame| frame.header.rect.is_some())
@@ -81,7 +81,7 @@ impl Waiting {
         self.frames.push_back(arrived);
     }
 
-    /// Whether the next one is to be answered without any work.
+    /// Whether the next frame is refused already, so that its answer takes no work.
     pub fn next_is_refused(&self) -> bool {
         self.frames.front().is_some_and(|next| next.frame.is_err())
     }
