@@ -233,7 +233,6 @@ pub struct Saturation(AtomicBool);
 impl Saturation {
     /// Notes that `free` of `all` places are free. Returns whether they count as full.
     pub fn update(&self, free: usize, all: usize) -> bool {
-
         let (fills, empties) = (free <= all / 10, free * 2 >= all);
         let before = self.0.load(Ordering::Relaxed);
         let now = if before { !empties } else { fills };
