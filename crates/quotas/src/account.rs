@@ -3,7 +3,7 @@
 //! Quotas are shares of what the service has: sessions and their bytes, requests in flight, streams, bytes of uploads,
 //! and frames and requests a second.
 
-use super::clients::{Client, Holdings};
+use super::clients::{Client, Holdings, Network};
 use super::rates::{self, FrameRate, Rate, RateExceeded};
 use super::video_places::VideoPlaces;
 use bagtrack_net::MessageRate;
@@ -27,9 +27,15 @@ pub struct Quotas {
 
 impl Quotas {
     /// What a client in these networks may hold.
-    fn holdings(&self, networks: &[Arc<Holdings>]) -> Holdings {
+    fn holdings(&self, networks: &[Arc<Network>]) -> Holdings {
         let budget = |most, of: fn(&Holdings) -> &Budget| {
-            Budget::of_client(most, networks.iter().map(|held| of(held).clone()).collect())
+            Budget::of_client(
+                most,
+                networks
+                    .iter()
+                    .map(|network| of(&network.held).clone())
+                    .collect(),
+            )
         };
         Holdings {
             sessions: budget(self.sessions, |held| &held.sessions),
@@ -52,9 +58,10 @@ pub struct Account {
     pub(super) all: Holdings,
     pub(super) held: Holdings,
     /// Keeps the networks' holdings known as long as one of their clients is.
-    _networks: Vec<Arc<Holdings>>,
+    _networks: Vec<Arc<Network>>,
     requests: Arc<Semaphore>,
-    videos: VideoPlaces,
+    /// The places for decoding videos that a video of the client takes: its own, then those of its networks.
+    videos: Vec<VideoPlaces>,
     messages: Arc<MessageRate>,
     asked: DefaultDirectRateLimiter,
     handshakes: DefaultDirectRateLimiter,
@@ -79,8 +86,9 @@ impl Account {
         flow: Flow,
         quotas: Quotas,
         all: Holdings,
-        networks: Vec<Arc<Holdings>>,
+        networks: Vec<Arc<Network>>,
     ) -> Self {
+        let of_networks = networks.iter().map(|network| network.videos.clone());
         Self {
             client,
             key: None,
@@ -88,9 +96,12 @@ impl Account {
             quotas,
             all,
             held: quotas.holdings(&networks),
+            videos: [VideoPlaces::new(1)]
+                .into_iter()
+                .chain(of_networks)
+                .collect(),
             _networks: networks,
             requests: places(quotas.requests),
-            videos: VideoPlaces::new(1),
             messages: Arc::new(rates::limiter(rates::MESSAGES)),
             asked: rates::limiter(rates::ASKED),
             handshakes: rates::limiter(rates::HANDSHAKES),
@@ -241,24 +252,29 @@ impl Account {
         Ok(place)
     }
 
-    /// Waits until `deadline` for the place for a video that is decoded.
+    /// Waits until `deadline` for the places that a video of the client takes while it is decoded, one of each of
+    /// [`Self::videos`].
     ///
     /// # Errors
-    /// The client's other video takes longer.
+    /// The client's other video, or those of its network, take longer.
     pub async fn video_until(
         &self,
         deadline: Instant,
-    ) -> Result<OwnedSemaphorePermit, QuotaExhausted> {
-        let place = self.videos.take_until(deadline).await;
-        place.ok_or(QuotaExhausted {
-            what: "videos at a time",
-            limit: 1,
-        })
+    ) -> Result<Vec<OwnedSemaphorePermit>, QuotaExhausted> {
+        let mut taken = Vec::new();
+        for places in &self.videos {
+            let place = places.take_until(deadline).await;
+            taken.push(place.ok_or(QuotaExhausted {
+                what: "videos at a time",
+                limit: places.all(),
+            })?);
+        }
+        Ok(taken)
     }
 
-    /// The client's places for decoding videos.
-    pub fn videos(&self) -> VideoPlaces {
-        self.videos.clone()
+    /// The places for decoding videos: the client's own, then those of its networks.
+    pub fn videos(&self) -> &[VideoPlaces] {
+        &self.videos
     }
 
     /// The rate at which the client may send frames of WebSockets, for all of its connections.

@@ -1,6 +1,7 @@
 //! Who is one client, as far as quotas and turns go, and what is held for each and for all of them.
 
 use super::account::{Account, Quotas};
+use super::video_places::VideoPlaces;
 use bagtrack_config::Config;
 use bagtrack_net::{customer_address, wider_networks};
 use bagtrack_sessions::{Budget, Flow, MAX_LIST_BYTES};
@@ -105,6 +106,13 @@ impl Holdings {
     }
 }
 
+/// What the clients of a network have together.
+#[derive(Debug)]
+pub(super) struct Network {
+    pub(super) held: Holdings,
+    pub(super) videos: VideoPlaces,
+}
+
 /// Where there are more accounts than this, those with nothing in use are forgotten.
 const MAX_IDLE_ACCOUNTS: usize = 1024;
 
@@ -114,7 +122,9 @@ pub struct Clients {
     quotas: Quotas,
     all: Holdings,
     accounts: Mutex<HashMap<Client, Arc<Account>>>,
-    networks: Mutex<HashMap<Ipv6Net, Arc<Holdings>>>,
+    networks: Mutex<HashMap<Ipv6Net, Arc<Network>>>,
+    /// The places for decoding videos that the clients of one network may take.
+    network_videos: usize,
     next_flow: AtomicU64,
 }
 
@@ -142,6 +152,8 @@ impl Clients {
             all: Holdings::of_all(config, has_store),
             accounts: Mutex::default(),
             networks: Mutex::default(),
+            // One is left to others.
+            network_videos: config.video_places() - 1,
             next_flow: AtomicU64::new(0),
         }
     }
@@ -166,7 +178,7 @@ impl Clients {
         }
         let flow = Flow(self.next_flow.fetch_add(1, Ordering::Relaxed));
         let networks = client.networks().map(|network| self.network(network));
-        let networks: Vec<Arc<Holdings>> = networks.collect();
+        let networks: Vec<Arc<Network>> = networks.collect();
         let account = Arc::new(Account::new(
             client.clone(),
             flow,
@@ -183,16 +195,21 @@ impl Clients {
         &self.all
     }
 
-    /// What the clients of a network hold.
-    fn network(&self, network: Ipv6Net) -> Arc<Holdings> {
+    /// What the clients of a network have together.
+    fn network(&self, network: Ipv6Net) -> Arc<Network> {
         // Nothing panics while the lock is held.
         let mut networks = self.networks.lock().unwrap_or_else(PoisonError::into_inner);
         if networks.len() >= MAX_IDLE_ACCOUNTS {
-            networks.retain(|_, held| Arc::strong_count(held) > 1);
+            networks.retain(|_, network| Arc::strong_count(network) > 1);
         }
         networks
             .entry(network)
-            .or_insert_with(|| Arc::new(Holdings::of_network()))
+            .or_insert_with(|| {
+                Arc::new(Network {
+                    held: Holdings::of_network(),
+                    videos: VideoPlaces::new(self.network_videos),
+                })
+            })
             .clone()
     }
 

@@ -32,6 +32,11 @@ impl VideoPlaces {
         }
     }
 
+    /// How many places there are.
+    pub fn all(&self) -> usize {
+        self.all
+    }
+
     /// How many places are taken.
     pub fn taken(&self) -> usize {
         self.all.saturating_sub(self.free.available_permits())

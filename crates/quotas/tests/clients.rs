@@ -128,7 +128,7 @@ async fn the_place_for_a_video_is_wanted_where_another_of_the_client_waits() {
     let held = account.video_until(after(1)).await.expect("it is free");
     let of_page = clients.account(&page());
     let next = tokio::spawn(async move { of_page.video_until(after(60)).await.is_ok() });
-    account.videos().wanted_from(after(30)).await;
+    account.videos()[0].wanted_from(after(30)).await;
     assert!(!next.is_finished());
     drop(held);
     assert!(next.await.expect("it does not panic"));

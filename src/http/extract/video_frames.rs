@@ -183,10 +183,11 @@ fn sentence(error: &VideoError) -> String {
     words
 }
 
-/// A place for a process that decodes a video, given back when this is dropped.
+/// The places that a video takes while it is decoded: of its client, of the client's networks, and of all. They are
+/// given back when this is dropped.
 #[derive(Debug)]
 pub struct VideoPlace {
-    _of_client: OwnedSemaphorePermit,
+    _of_client: Vec<OwnedSemaphorePermit>,
     _of_all: OwnedSemaphorePermit,
 }
 

@@ -9,6 +9,7 @@ use axum::body::{Body, BodyDataStream, Bytes};
 use axum::response::Response;
 use bagtrack_quotas::{Client, VideoPlaces};
 use bagtrack_sessions::clock::{self, Instant};
+use futures_util::future::select_all;
 use futures_util::{StreamExt, stream};
 use std::io;
 use std::time::Duration;
@@ -23,10 +24,12 @@ pub fn to_reader(state: &AppState, client: &Client, answer: Response) -> Respons
     let (head, body) = answer.into_parts();
     let (sender, receiver) = mpsc::channel(1);
     let patience = state.config.work_timeout * READER_PATIENCE;
+    let account = state.clients.account(client);
+    let places = account.videos().iter().chain([&state.videos]);
     let sent = send(
         body.into_data_stream(),
         sender,
-        [state.videos.clone(), state.clients.account(client).videos()],
+        places.cloned().collect(),
         patience,
     );
     tokio::spawn(sent.in_current_span());
@@ -46,7 +49,7 @@ pub fn to_reader(state: &AppState, client: &Client, answer: Response) -> Respons
 async fn send(
     mut answer: BodyDataStream,
     sender: mpsc::Sender<Option<Bytes>>,
-    places: [VideoPlaces; 2],
+    places: Vec<VideoPlaces>,
     mut patience: Duration,
 ) {
     loop {
@@ -73,10 +76,10 @@ async fn send(
     }
 }
 
-/// Ready when it is `from` or later, and a video of anybody, or another one of the client, waits for a place.
-async fn wanted_from([of_all, of_client]: &[VideoPlaces; 2], from: Instant) {
-    tokio::select! {
-        () = of_all.wanted_from(from) => {}
-        () = of_client.wanted_from(from) => {}
-    }
+/// Ready when it is `from` or later, and a video waits for one of these places.
+async fn wanted_from(places: &[VideoPlaces], from: Instant) {
+    let wanted = places
+        .iter()
+        .map(|places| Box::pin(places.wanted_from(from)));
+    select_all(wanted).await;
 }
