@@ -52,6 +52,11 @@ impl Pair {
         track.await.follow().await
     }
 
+    /// The key of the session's record in the Redis.
+    pub fn key(&self) -> String {
+        format!("bagtrack:session:{{{}}}", self.id)
+    }
+
     pub fn url(&self, replica: usize, rest: &str) -> String {
         self.replicas[replica].url(&format!("/sessions/{}{rest}", self.id))
     }

@@ -61,6 +61,20 @@ async fn a_session_can_be_ended_where_the_memory_is_used_up() {
 
 #[tokio::test]
 #[ignore = "needs redis"]
+async fn a_session_whose_state_is_damaged_in_the_store_can_be_ended() {
+    let pair = Pair::open(&[], 3).await;
+    pair.redis.ask(&["hset", &pair.key(), "state", "damaged"]);
+    let damaged = json(pair.view(1).await, StatusCode::INTERNAL_SERVER_ERROR).await;
+    assert_eq!(damaged["type"], "/docs/problems#internal");
+    let ended = pair.client.delete(pair.url(1, "")).send().await.unwrap();
+    assert_eq!(ended.status(), StatusCode::NO_CONTENT);
+    for replica in [0, 1] {
+        json(pair.post(replica, 1).await, StatusCode::NOT_FOUND).await;
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs redis"]
 async fn a_store_that_gives_no_answer_is_waited_for_once() {
     const PATIENCE: Duration = Duration::from_secs(3);
     let pair = Pair::open(&["--store-timeout", "3s"], 8).await;
@@ -89,7 +103,7 @@ async fn a_store_that_gives_no_answer_is_waited_for_once() {
 async fn a_frame_that_is_taken_renews_the_time_to_live_and_a_refused_one_does_not() {
     let flags = ["--session-first", "20s", "--session-idle", "100s"];
     let pair = Pair::open(&flags, 3).await;
-    let key = format!("bagtrack:session:{{{}}}", pair.id);
+    let key = pair.key();
     let lives = || -> u64 { pair.redis.ask(&["pttl", &key]).trim().parse().unwrap() };
     assert!(lives() <= 20_000);
     json(pair.post_as(0, 5, 1).await, StatusCode::CONFLICT).await;

@@ -269,13 +269,9 @@ fn take_over(pair: &Pair, format: u8) -> u8 {
         redis.call('hset', KEYS[1], 'head', string.char(ARGV[1]) .. string.sub(head, 2)) \
         redis.call('hincrby', KEYS[1], 'generation', 1) \
         return string.byte(head)";
-    let (key, format) = (key(pair), format.to_string());
+    let (key, format) = (pair.key(), format.to_string());
     let before = pair.redis.ask(&["eval", script, "1", &key, &format]);
     before.trim().parse().expect("a byte")
-}
-
-fn key(pair: &Pair) -> String {
-    format!("bagtrack:session:{{{}}}", pair.id)
 }
 
 /// A version that writes another format is in the cluster: both programs refuse its records, and leave them.
@@ -289,7 +285,7 @@ async fn a_record_of_a_later_version_is_refused_and_goes_on_when_that_is_taken_b
         assert_eq!(answer["frame"], number);
     }
     let format = take_over(&pair, LATER);
-    let fields = || pair.redis.ask(&["--no-raw", "hgetall", &key(&pair)]);
+    let fields = || pair.redis.ask(&["--no-raw", "hgetall", &pair.key()]);
     let before = fields();
     // The second one answered the frame before, so it has the session in memory.
     for replica in [0, 1] {

@@ -138,9 +138,8 @@ impl SessionPath {
     }
 
     pub async fn end(&self, state: &AppState) -> Result<(), Problem> {
-        self.find(state).await?;
-        let (owner, flow) = (self.caller.owner(), state.flow(&self.client));
-        Ok(state.service.end(self.id()?, owner, flow).await?)
+        let (owner, only) = (self.caller.owner(), self.caller.only);
+        Ok(state.service.end(self.id()?, owner, only).await?)
     }
 
     fn id(&self) -> Result<Uuid, Problem> {

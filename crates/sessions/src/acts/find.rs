@@ -3,10 +3,10 @@
 use super::error::ActError;
 use super::service::SessionService;
 use crate::planted::PlantedFault;
-use crate::store::{Record, Step, StoreUnavailable};
+use crate::store::{Record, SessionName, Step, StoreUnavailable};
 use crate::{
     Flow, LockedSession, NewSession, NoSession, Owner, Session, SessionState, SnapshotError,
-    WorkMeter,
+    WorkMeter, short_id,
 };
 use std::sync::Arc;
 use std::time::Duration;
@@ -137,34 +137,56 @@ impl SessionService {
         .await
     }
 
-    /// Ends the session of this id and owner everywhere. Work that has begun still gets its answer.
+    /// Ends the session of this id and owner everywhere, and no other one than `only`, where that is given. Work that has
+    /// begun still gets its answer. The state is not read, so a session whose state in the store is damaged ends, too.
     ///
     /// # Errors
     /// There is none, or the store gives no answer.
-    pub async fn end(&self, id: Uuid, owner: &Owner, flow: Flow) -> Result<(), ActError> {
+    pub async fn end(
+        &self,
+        id: Uuid,
+        owner: &Owner,
+        only: Option<SessionName>,
+    ) -> Result<(), ActError> {
         // What is in memory may be a session that had the id before.
         for _ in 0..2 {
-            let session = self.find(id, owner, flow).await?;
-            if self.end_one(&session).await? {
-                tracing::info!(session = session.short_id(), "deleted");
+            let name = self.name_of(id, owner).await?;
+            if only.is_some_and(|only| only != name) {
+                break;
+            }
+            if self.end_one(name).await? {
+                tracing::info!(session = short_id(id), "deleted");
                 return Ok(());
             }
         }
         Err(NoSession::Unknown.into())
     }
 
-    /// False where it had ended before: another one may have its id.
-    async fn end_one(&self, session: &Arc<Session>) -> Result<bool, StoreUnavailable> {
-        if let Some(store) = &self.store {
-            let ttl = self.registry.idle_lease().min(TOMBSTONE);
-            if !store.end(session.name(), ttl).await? {
-                self.registry.forget(session);
-                return Ok(false);
-            }
-            // It may have left memory meanwhile.
-            self.registry.remove(session.name());
-            return Ok(true);
+    /// The name of the session of this id and owner, from memory or from the store.
+    async fn name_of(&self, id: Uuid, owner: &Owner) -> Result<SessionName, ActError> {
+        let missing = match self.registry.find(id, owner) {
+            Ok(session) => return Ok(session.name()),
+            Err(missing) => missing,
+        };
+        let Some(store) = &self.store else {
+            return Err(missing.into());
+        };
+        let record = store.load(id).await?.ok_or(missing)?;
+        let incarnation = record.opening.incarnation;
+        match record.owner == *owner {
+            true => Ok(SessionName { id, incarnation }),
+            false => Err(NoSession::Unknown.into()),
         }
-        Ok(self.registry.remove(session.name()))
+    }
+
+    /// Returns false if the session had ended before; another one may have its id.
+    async fn end_one(&self, name: SessionName) -> Result<bool, StoreUnavailable> {
+        let Some(store) = &self.store else {
+            return Ok(self.registry.remove(name));
+        };
+        let ttl = self.registry.idle_lease().min(TOMBSTONE);
+        let has_ended_it = store.end(name, ttl).await?;
+        self.registry.remove(name);
+        Ok(has_ended_it)
     }
 }

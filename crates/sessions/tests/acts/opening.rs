@@ -47,7 +47,7 @@ async fn a_request_that_comes_again_finds_the_session_that_it_opened() {
     assert!(!of_ann.replayed && of_ann.session.id() != first.session.id());
     // After the session has ended, the same key opens a new one.
     let id = first.session.id();
-    service.end(id, &Owner::default(), FLOW).await.unwrap();
+    service.end(id, &Owner::default(), None).await.unwrap();
     let anew = ask(key("one"), 2).await.unwrap();
     assert!(!anew.replayed && anew.session.id() != id);
     // Without a name each request opens one.
@@ -231,11 +231,11 @@ async fn a_session_is_its_owner_s_until_it_expires_or_is_ended() {
 
     let ended = open(&service, Boxes::One(FIRST)).await;
     let id = ended.id();
-    let refused = service.end(id, &ann, FLOW).await;
+    let refused = service.end(id, &ann, None).await;
     assert_matches!(refused, Err(ActError::NoSession(NoSession::Unknown)));
-    service.end(id, &nobody, FLOW).await.unwrap();
+    service.end(id, &nobody, None).await.unwrap();
     assert_eq!(missing(&service, id, &nobody).await, NoSession::Unknown);
-    assert!(service.end(id, &nobody, FLOW).await.is_err());
+    assert!(service.end(id, &nobody, None).await.is_err());
     assert!(!service.registry.remove(ended.name()));
 }
 
@@ -285,7 +285,7 @@ async fn names_of_sessions_that_have_ended_are_dropped() {
     let again = service.open(request(&service, key("one"), 2, begin()));
     assert!(matches!(again.await, Err(OpenError::KeyReused)));
     service
-        .end(session.id(), &Owner::default(), FLOW)
+        .end(session.id(), &Owner::default(), None)
         .await
         .unwrap();
     service.prune();

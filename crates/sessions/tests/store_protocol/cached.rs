@@ -27,13 +27,13 @@ async fn a_session_of_another_replica_is_its_owner_s_alone() {
     assert_matches!(of_ann, Err(ActError::NoSession(NoSession::Unknown)));
     let own = other.find(ID, &Owner::default(), FLOW).await.unwrap();
     assert_eq!(own.latest_frame(), 0);
-    other.end(ID, &Owner::default(), FLOW).await.unwrap();
+    other.end(ID, &Owner::default(), None).await.unwrap();
 }
 
 #[tokio::test]
 async fn a_session_that_was_ended_elsewhere_leaves_memory() {
     let [first, other] = two().await;
-    other.end(ID, &Owner::default(), FLOW).await.unwrap();
+    other.end(ID, &Owner::default(), None).await.unwrap();
     let cached = first.find(ID, &Owner::default(), FLOW).await.unwrap();
     let refused = first.refresh(&cached, None, FLOW).await;
     assert_matches!(refused, Err(ActError::NoSession(NoSession::Unknown)));

@@ -1,6 +1,6 @@
 //! Requests with an idempotency key, at replicas with one store.
 
-use crate::common::{FIRST, FLOW, request};
+use crate::common::{FIRST, request};
 use crate::hostile::HostileStore;
 use crate::pictures::{params, picture};
 use crate::redis::Redis;
@@ -62,7 +62,7 @@ async fn keys_hold_for(store: Arc<dyn SessionStore>) {
         assert!(both.0.replayed != both.1.replayed, "one has opened it");
     }
     // After the session has ended, the same key opens a new one.
-    one.end(first.session.id(), &ann, FLOW).await.unwrap();
+    one.end(first.session.id(), &ann, None).await.unwrap();
     let anew = ask(&other, &ann, "a", good()).await.unwrap();
     assert!(!anew.replayed && anew.session.name() != first.session.name());
 }

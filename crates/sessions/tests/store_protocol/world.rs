@@ -157,7 +157,7 @@ pub async fn answer(service: &SessionService, asked: &Asked) -> Answer {
                 Err(error) => Answer::Nothing(error.to_string()),
             }
         }
-        Asked::End => match service.end(ID, &Owner::default(), FLOW).await {
+        Asked::End => match service.end(ID, &Owner::default(), None).await {
             Ok(()) => Answer::Ended,
             Err(error) => Answer::Nothing(error.to_string()),
         },
