@@ -1,8 +1,8 @@
 //! Takes the next frames of a session, in their turn.
 //!
-//! A frame that comes a little early waits for those before it. With a store they may come to other replicas, so the
-//! store is asked where the session stands. Without numbers nothing tells the order, so a request is refused that comes
-//! while another one is at the session.
+//! A numbered frame that comes a little early waits for the frames before it. With a store these may come to other
+//! replicas, so the store is asked for the session's last frame. Frames without numbers have no known order: a request
+//! with such frames is refused if it comes while another one with frames is at the session.
 
 use super::error::{ActError, FramesError};
 use super::frames::{FrameBatch, Tracked};
@@ -19,18 +19,18 @@ use std::time::Duration;
 
 /// How long an early frame waits for its turn.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// How long until the store is asked first, and the longest time between two questions; each takes twice as long.
+/// The pause after the first question to the store. The pause doubles after each question, up to the longest.
 const FIRST_PAUSE: Duration = Duration::from_millis(20);
 const LONGEST_PAUSE: Duration = Duration::from_millis(320);
 
 impl SessionService {
-    /// Waits for the turn of a request whose (first) frame has this number. Meanwhile another request may have its
-    /// place in the queue.
+    /// Waits for the turn of a request whose (first) frame has this number. While it waits, its place in the queue is
+    /// free for another request.
     ///
     /// # Errors
-    /// It has no number, and another request with frames was at the session when it came; or it is early, and has the
-    /// last place at the session; or the session has ended, the store gives no answer, or the queue is full after the
-    /// wait.
+    /// The frame has no number, and another request with frames was at the session when this one came; or the frame is
+    /// early, and this request took the session's last permit; or the session has ended, the store gives no answer, or
+    /// the queue is full after the wait.
     pub async fn wait_for_turn(
         &self,
         permit: &SessionPermit,
@@ -65,16 +65,16 @@ impl SessionService {
     }
 }
 
-/// How often the frames of one request are looked at: other replicas may be there first each time.
+/// How often the frames of one request are tracked at most: each time another replica may commit a frame first.
 const MAX_ATTEMPTS: usize = 4;
 
-/// What came of the frames, on a copy of the state.
+/// The result of a request's frames, on a copy of the session's state.
 enum Attempt {
-    /// They were tracked, up to this state; its bytes are there where they are to be written.
+    /// The frames were tracked: the state after them, the answers, and the state's bytes where it is to be stored.
     Tracked(Box<SessionState>, Tracked, Option<Bytes>),
-    /// They were answered before.
+    /// All frames were answered before; these are the stored answers.
     Replayed(Tracked),
-    /// Their number does not fit this state. Another one might.
+    /// The frame number does not fit this copy, but may fit a newer state in the store.
     Misnumbered(ReplayError),
 }
 
@@ -82,7 +82,8 @@ impl SessionService {
     /// The answers to the next frames of a session.
     ///
     /// # Errors
-    /// That of the first bad frame, of the frame number, or of the store. The session is unchanged.
+    /// A frame cannot be tracked, the frame number does not fit, the session has ended, the store gives no answer, or
+    /// time is over. The session is unchanged.
     pub async fn advance(
         &self,
         permit: SessionPermit,
@@ -117,7 +118,8 @@ impl SessionService {
             true => self.lock_newest(permit, flow, true).await?,
             false => permit.lock().await?,
         };
-        // Whether another frame was there first, and whether the state is what the store told.
+        // Whether another replica's frame was committed before tracked ones of this request, and whether the copy was
+        // loaded from the store for this request.
         let (mut was_late, mut is_told) = (false, false);
         for _ in 0..MAX_ATTEMPTS {
             let attempt;
@@ -147,7 +149,7 @@ impl SessionService {
         Err(SessionBusy.into())
     }
 
-    /// Looks at the frames on a worker, with a copy of the state.
+    /// Tracks the frames on a worker, on a copy of the state; or finds their stored answers.
     async fn attempt(
         &self,
         queue: QueuePermit,
@@ -155,7 +157,7 @@ impl SessionService {
         batch: Arc<FrameBatch>,
     ) -> Result<(LockedSession, Attempt), FramesError> {
         let (limits, metrics) = (self.request_limits(), self.tracking.clone());
-        // What is in memory only would be lost soon.
+        // A draining process ends soon: it stores the state after every request.
         let every = if self.is_draining() {
             1
         } else {
@@ -187,7 +189,8 @@ impl SessionService {
         .await
     }
 
-    /// Commits the frames to the store, or asks it whether the copy is the newest. Without a store it is.
+    /// Commits tracked frames to the store; for others, asks the store whether the copy is the newest. Without a store
+    /// the copy always is.
     async fn commit(
         &self,
         locked: &LockedSession,
@@ -207,7 +210,8 @@ impl SessionService {
                     before,
                     frame: state.latest_frame(),
                     state: bytes.clone(),
-                    // A frame that comes late, after others that only another replica has, takes nothing back.
+                    // A numbered frame may be late: another replica may have tracked frames after it. So its first
+                    // attempt does not take the record back to its checkpoint.
                     takes_over: is_told || batch.number.is_none(),
                     ttl,
                 };
@@ -233,7 +237,7 @@ pub(super) fn largest(files: &[Bytes]) -> usize {
 }
 
 impl Attempt {
-    /// What the store is asked on behalf of, where the copy stands at this frame.
+    /// What the request wants of the copy, whose last frame is `latest`.
     fn intent(&self, batch: &FrameBatch, latest: u64, is_told: bool) -> Intent {
         match self {
             _ if batch.is_unordered() => Intent::Unordered,
@@ -243,7 +247,7 @@ impl Attempt {
         }
     }
 
-    /// What the store did not take stays in memory, where that fault is planted.
+    /// The fault [`PlantedFault::KeepsUncommitted`]: a state that the store did not take stays in memory.
     fn keep_uncommitted(self, locked: &mut LockedSession) {
         if let Self::Tracked(state, ..) = self
             && PlantedFault::KeepsUncommitted.is_here()
@@ -253,7 +257,7 @@ impl Attempt {
         }
     }
 
-    /// The copy becomes the session's state.
+    /// Makes the copy the session's state. Returns the answers, or why the number does not fit.
     fn accept(self, locked: &mut LockedSession, was_late: bool) -> Result<Tracked, FramesError> {
         let session = locked.session().clone();
         let mut tracked = match self {
@@ -265,7 +269,7 @@ impl Attempt {
                 tracked
             }
             Self::Replayed(tracked) => tracked,
-            // Another frame with its number won, at another replica.
+            // Another replica tracked another frame under this number first.
             Self::Misnumbered(ReplayError::Differs { got, expected }) if was_late => {
                 return Err(ReplayError::OutOfOrder { got, expected }.into());
             }

@@ -1,4 +1,4 @@
-//! Why an act was not done. None of them changes a session.
+//! Why an act was not done. An act that fails leaves the session's state unchanged.
 
 use crate::store::StoreShare;
 use crate::{
@@ -44,7 +44,7 @@ impl From<SessionClosed> for ActError {
 }
 
 impl ActError {
-    /// Whether trying again soon makes sense: only the service is to blame, or the time was too short.
+    /// Whether the same request may succeed soon: the service was busy or away, or the time was too short.
     pub fn is_temporary(&self) -> bool {
         match self {
             Self::Busy(_) | Self::QueueFull(_) | Self::Store(_) | Self::TooManySessions(_) => true,
@@ -60,27 +60,27 @@ pub enum FrameFault {
     /// The file cannot be decoded.
     #[error(transparent)]
     Ingest(#[from] IngestError),
-    /// The tracker does not take it.
+    /// The tracker refuses the frame.
     #[error(transparent)]
     Tracker(#[from] TrackerError),
 }
 
-/// Why frames were not tracked: none of them was.
+/// Why none of a request's frames was tracked.
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum FramesError {
     /// See [`ActError`].
     #[error(transparent)]
     Act(#[from] ActError),
-    /// The frame number does not fit.
+    /// The frame number is out of order, or was used for another frame.
     #[error(transparent)]
     Replay(#[from] ReplayError),
-    /// Frames without numbers came at the same time.
+    /// The frames have no numbers, and another request with frames was at the session.
     #[error("another request with frames was at the session")]
     NotInOrder,
-    /// A newer stream has the place of the one that the frames came over.
+    /// A newer stream of the session has replaced the stream of these frames.
     #[error("a newer stream has taken the place of this one")]
     StreamReplaced,
-    /// It is not told which target is meant, or there is none of this number.
+    /// A corrected box names no target where the session has several, or a target that does not exist.
     #[error("the session has {count} targets")]
     NoSuchTarget {
         /// How many there are.
@@ -96,7 +96,7 @@ pub enum FramesError {
         /// Why.
         fault: FrameFault,
     },
-    /// The corrected box cannot be meant.
+    /// The corrected box is implausible.
     #[error(transparent)]
     Box(#[from] ImplausibleBox),
     /// The frames have too many pixels together.
@@ -120,7 +120,7 @@ impl FramesError {
     }
 }
 
-/// An error of one frame, the only one.
+/// The fault of a request's only frame.
 impl From<FrameFault> for FramesError {
     fn from(fault: FrameFault) -> Self {
         Self::Frame {
@@ -131,13 +131,13 @@ impl From<FrameFault> for FramesError {
     }
 }
 
-/// A client has as many sessions as it may, or as large ones.
+/// A client has as many sessions, requests or streams as it may, or its sessions are as large as they may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the client has as many {what} as it may, {limit}")]
 pub struct QuotaExhausted {
-    /// What it has so many of.
+    /// What the client has too many of, in the plural.
     pub what: &'static str,
-    /// How many it may have.
+    /// How many the client may have.
     pub limit: usize,
 }
 
@@ -147,10 +147,10 @@ pub enum OpenError {
     /// See [`ActError`].
     #[error(transparent)]
     Act(#[from] ActError),
-    /// The frame cannot be decoded.
+    /// The first frame cannot be used.
     #[error(transparent)]
     Frame(#[from] FramesError),
-    /// The tracker does not take a box, or a parameter. With a list of boxes, how many there are.
+    /// The tracker refuses a box or a parameter.
     #[error("{error}")]
     Start {
         /// Why.
@@ -158,12 +158,12 @@ pub enum OpenError {
         /// How many boxes were given, where they were given as a list.
         listed: Option<usize>,
     },
-    /// A box cannot be meant.
+    /// A box is implausible.
     #[error("{error}")]
     Box {
         /// Why.
         error: ImplausibleBox,
-        /// Which of how many, where they were given as a list.
+        /// The box's index, from 0, and the number of boxes, where they were given as a list.
         listed: Option<(usize, usize)>,
     },
     /// The snapshot cannot be restored.
@@ -175,7 +175,7 @@ pub enum OpenError {
     /// The client has as many sessions as it may.
     #[error(transparent)]
     Quota(#[from] QuotaExhausted),
-    /// The client has used up what it may have in the store that replicas share.
+    /// The client has used up its share of the store.
     #[error("the client has {} places of sessions in the store, or {} bytes of them", .0.max_places, .0.max_bytes)]
     StoreShare(StoreShare),
     /// The client may never have a session with so many targets: each counts as a session.
@@ -186,7 +186,7 @@ pub enum OpenError {
         /// How many sessions the client may have.
         limit: usize,
     },
-    /// A live session that another request opened has the id.
+    /// Another request has opened a session with this id.
     #[error("another session has this id")]
     Exists,
     /// The idempotency key was used for another request.
@@ -206,10 +206,10 @@ impl From<InsertError> for OpenError {
 /// Why nothing was tracked without a session.
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum TrackError {
-    /// The frames.
+    /// The frames cannot be tracked.
     #[error(transparent)]
     Frames(#[from] FramesError),
-    /// The beginning of the track.
+    /// The track cannot begin.
     #[error(transparent)]
     Open(#[from] OpenError),
 }

@@ -12,15 +12,15 @@ use std::sync::Arc;
 use std::time::Duration;
 use uuid::Uuid;
 
-/// How long the store tells at most that a session was ended: much longer than any request takes. Later it tells that
-/// there is none. Nobody's quota counts these marks.
+/// How long at most the store keeps the mark of an ended session: much longer than any request takes. After that the
+/// session is unknown. Marks count against nobody's quota.
 const TOMBSTONE: Duration = Duration::from_secs(600);
 
 impl SessionService {
     /// The live session of this id and owner, from memory or from the store.
     ///
     /// # Errors
-    /// There is none, or the store gives no answer.
+    /// There is no such session, or the store gives no answer.
     pub async fn find(
         &self,
         id: Uuid,
@@ -38,7 +38,7 @@ impl SessionService {
         }
     }
 
-    /// The session that has this id by what the store says, whoever it belongs to.
+    /// The session that has this id in the store, whoever owns it. Without a store, the session in memory.
     pub(super) async fn find_authoritative(
         &self,
         id: Uuid,
@@ -58,7 +58,7 @@ impl SessionService {
         }
     }
 
-    /// The session of this id from the store, which is then in memory too.
+    /// Loads the session of this id from the store into memory.
     async fn load(&self, id: Uuid, flow: Flow) -> Result<Option<Arc<Session>>, ActError> {
         let Some(store) = &self.store else {
             return Ok(None);
@@ -69,7 +69,7 @@ impl SessionService {
         }
     }
 
-    /// The session of a record, which is then in memory.
+    /// Takes the session of a record into memory.
     async fn insert(&self, id: Uuid, record: Record, flow: Flow) -> Result<Arc<Session>, ActError> {
         let (service, queue) = (self.clone(), self.admission.enter(flow, Box::new(()))?);
         let read = move |_: &mut WorkMeter| {
@@ -93,7 +93,7 @@ impl SessionService {
         };
         match self.registry.insert(new) {
             Ok(session) => Ok(session),
-            // Another request has loaded it in the meantime.
+            // Another request has loaded the session in the meantime, or memory is full.
             Err(_) => {
                 let live = self.registry.live(id);
                 live.ok_or_else(|| self.registry.full().into())
@@ -101,7 +101,8 @@ impl SessionService {
         }
     }
 
-    /// The state of a record, read beside that of the same session at another frame. It takes a worker's time.
+    /// The state of a record; its trackers reuse what they have in common with `known`, the same session at another
+    /// frame. Reading takes long, so it is done on a worker.
     fn read_state(
         &self,
         record: &Record,
@@ -110,14 +111,14 @@ impl SessionService {
         let (max_recent, expert) = (self.settings.max_answers, self.expert.as_ref());
         let state = SessionState::from_stored(&record.state, max_recent, expert, known);
         let state = state.map_err(ActError::StoredState)?;
-        // From another frame on, the record's numbers would not be the session's.
+        // If the state is not that of the checkpoint, the record's frame numbers do not fit it.
         match state.latest_frame() == record.version.checkpoint {
             true => Ok(state),
             false => Err(ActError::StoredState(SnapshotError::Damaged)),
         }
     }
 
-    /// Goes on from a record of the store, which is of this session.
+    /// Replaces the session's state and version by those of its record in the store.
     pub(super) async fn take_over(
         &self,
         mut locked: LockedSession,
@@ -141,14 +142,15 @@ impl SessionService {
     /// begun still gets its answer. The state is not read, so a session whose state in the store is damaged ends, too.
     ///
     /// # Errors
-    /// There is none, or the store gives no answer.
+    /// There is no such session, or the store gives no answer.
     pub async fn end(
         &self,
         id: Uuid,
         owner: &Owner,
         only: Option<SessionName>,
     ) -> Result<(), ActError> {
-        // What is in memory may be a session that had the id before.
+        // Memory may have an older session of this id, which has ended in the store: the second attempt finds the newer
+        // one.
         for _ in 0..2 {
             let name = self.name_of(id, owner).await?;
             if only.is_some_and(|only| only != name) {

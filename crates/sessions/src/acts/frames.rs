@@ -12,38 +12,39 @@ use bagtrack_tracker::{Diagnostics, Rect, TrackerError, check_box};
 use bytes::Bytes;
 use std::sync::Arc;
 
-/// The last answers that are kept, for a client that takes up where its line broke, and for requests on their way whose
-/// answers were lost.
+/// How many of its last answers a session keeps at least: for a client that goes on after its connection broke, and for
+/// requests that are sent again because their answers were lost.
 pub const KEPT_ANSWERS: usize = 32;
 
 /// The next frames of a session, as they were received.
 #[derive(Debug, Default)]
 pub struct FrameBatch {
-    /// What the client calls the first of them, where it numbers them.
+    /// The number of the first frame, where the client numbers its frames.
     pub number: Option<u64>,
-    /// The files, at least one.
+    /// The image files of the frames, at least one.
     pub files: Vec<Bytes>,
-    /// The box in the only frame, where the user corrects it.
+    /// The corrected box of a target in the (first) frame, where the user gives one.
     pub correction: Option<GivenBox>,
     /// How many of the last answers are kept at least: [`KEPT_ANSWERS`], or more.
     pub min_answers: usize,
-    /// Whether the client wants to know what the trackers saw.
+    /// Whether the client asks for [`Tracked::diagnostics`].
     pub with_diagnostics: bool,
-    /// The stream that they came over. It tells their order, and tracks none after a newer one has taken its place.
+    /// The stream that the frames came over; it has them in order. None is tracked after a newer stream has taken its
+    /// place.
     pub stream: Option<Arc<StreamPlace>>,
 }
 
 /// The box of a target, given by the user.
 #[derive(Debug, Clone, Copy)]
 pub struct GivenBox {
-    /// Which target, counted from 0, where the user says it.
+    /// The target's index, from 0. It may be missing where the session has only one target.
     pub target: Option<usize>,
     /// The box.
     pub to: Rect,
 }
 
 impl GivenBox {
-    /// The correction in a session with so many targets and frames of this size.
+    /// Checks the box against a session with `count` targets and uploaded frames of `size` (width, height) pixels.
     fn of(self, count: usize, size: (u32, u32)) -> Result<Correction, FramesError> {
         check_box(&self.to, size)?;
         match self.target {
@@ -62,11 +63,12 @@ impl GivenBox {
 pub struct Tracked {
     /// One for each frame, in the order of the frames.
     pub estimates: Vec<Estimates>,
-    /// Whether they were given before.
+    /// Whether these are the stored answers to a request that was sent again.
     pub replayed: bool,
-    /// What the tracker of each target saw in the last frame, where that was asked for and the frame was tracked now.
+    /// The diagnostics of each target's tracker for the last frame; empty unless asked for, and for a replay or a
+    /// correction.
     pub diagnostics: Vec<Diagnostics>,
-    /// The last frame whose state is in the store, where there is one.
+    /// The number of the last frame whose state is in the store; `None` without a store.
     pub checkpoint: Option<u64>,
 }
 
@@ -91,7 +93,7 @@ impl FrameBatch {
         }
     }
 
-    /// Whether nothing tells their order.
+    /// Whether the order of the frames is unknown.
     pub(super) fn is_unordered(&self) -> bool {
         self.number.is_none() && self.stream.is_none()
     }
@@ -101,7 +103,8 @@ impl FrameBatch {
     /// them is in memory. Between frames `meter` says whether to go on.
     ///
     /// # Errors
-    /// That of the first bad frame, or of a request that costs too much. The state is to be dropped then.
+    /// A frame cannot be used, the frame number does not fit, the frames have too many pixels, or the work was stopped.
+    /// `state` may then be half-way through the frames: drop it.
     pub(super) fn track(
         &self,
         state: &mut SessionState,
@@ -156,12 +159,12 @@ impl FrameBatch {
     /// Refuses a frame whose size is not the session's, and a request with too many pixels, by their headers alone.
     ///
     /// # Errors
-    /// It is one of these, or no image.
+    /// A frame has another size or is no image, or the frames have too many pixels together.
     pub fn check_sizes(&self, limits: &RequestLimits, size: (u32, u32)) -> Result<(), FramesError> {
         self.inspect(limits, size).map(drop)
     }
 
-    /// As [`check_sizes`](Self::check_sizes); returns what the headers say.
+    /// As [`check_sizes`](Self::check_sizes); returns the frames with their parsed headers.
     fn inspect(
         &self,
         limits: &RequestLimits,
@@ -215,7 +218,7 @@ impl RequestLimits {
 /// Refuses a request whose frames have too many pixels together, by their headers alone.
 ///
 /// # Errors
-/// They have, or one of them is no image.
+/// The frames have too many pixels together, or one of them is no image.
 pub(super) fn check_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<(), FramesError> {
     let inspected = files.iter().enumerate().map(|(index, file)| {
         bagtrack_ingest::inspect(file, &limits.frame)
@@ -225,10 +228,11 @@ pub(super) fn check_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<()
     limits.check_pixels(pixels(&inspected), files.len())
 }
 
-/// The same where each frame is answered for itself: one that is no image is refused in its turn.
+/// As `check_pixels`, for requests that answer each frame on its own: files that are no images count nothing here, and
+/// are refused in their turn.
 ///
 /// # Errors
-/// Those that are images have too many pixels.
+/// The images have too many pixels together.
 pub fn check_readable_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<(), FramesError> {
     let inspected = files
         .iter()

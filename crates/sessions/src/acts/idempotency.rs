@@ -1,10 +1,10 @@
 //! A request to open a session that is sent again gets the same answer, and opens no second one: it has an
 //! `Idempotency-Key`, or an id that its client made.
 //!
-//! In memory a name is kept as long as its session. Requests that were refused leave names as well, which go when there
-//! are too many. In a store none is kept: the id follows from the key (`id_of`), and the store takes the first of two
-//! sessions of one id. Requests with one name are served one after the other. Problems are not stored: the request can
-//! be sent again after them.
+//! Memory keeps a name (key or id) as long as its session lives. Refused requests leave names, too; these are dropped
+//! when there are too many. A store keeps no names: the id is computed from the key (`id_of`), and of two sessions of
+//! one id the store takes the first. Requests of one name are served one after the other. A refusal is not stored: the
+//! request can be sent again.
 
 use crate::Owner;
 use crate::sync::{Mutex, lock};
@@ -22,8 +22,8 @@ pub enum CreationKey {
     Id(Uuid),
 }
 
-/// The id of the session that an owner's idempotency key names, for a store with this secret. Nothing has to be kept of
-/// the key, and whoever does not know the secret cannot tell the id.
+/// The id of the session that an owner's idempotency key names, from the store's secret: all replicas compute the same
+/// id, and clients, who do not know the secret, cannot guess it.
 pub(super) fn id_of(secret: &[u8; 32], owner: &Owner, key: &str) -> Uuid {
     let owned = serde_json::json!([owner.name(), key]).to_string();
     let hash = blake3::keyed_hash(secret, owned.as_bytes());
@@ -31,7 +31,8 @@ pub(super) fn id_of(secret: &[u8; 32], owner: &Owner, key: &str) -> Uuid {
     uuid::Builder::from_random_bytes(*bytes).into_uuid()
 }
 
-/// The session that a request of one name opened, once there is one. Whoever holds the lock is about to open it.
+/// The id of the session that was opened under one name, once there is one. Whoever holds the lock may be about to open
+/// the session.
 pub type Entry = Arc<AsyncMutex<Option<Uuid>>>;
 
 /// The sessions by the names under which they were opened.
@@ -42,8 +43,8 @@ pub struct IdempotencyStore {
 }
 
 impl IdempotencyStore {
-    /// No sessions yet. `max_entries` is more than the sessions and the requests inside together: requests that were
-    /// refused leave entries, which go when there are so many.
+    /// An empty map. `max_entries` must be larger than the most live sessions and open requests together. When there
+    /// are so many entries, those of refused requests and ended sessions are dropped.
     pub fn new(max_entries: usize) -> Self {
         let entries = Mutex::default();
         Self {
@@ -52,7 +53,7 @@ impl IdempotencyStore {
         }
     }
 
-    /// The entry of a name: the one that is there, or a new one.
+    /// The entry of a name, which is made if it is missing.
     pub fn entry(&self, name: CreationKey, is_live: impl Fn(Uuid) -> bool) -> Entry {
         if lock(&self.entries).len() >= self.max_entries {
             self.prune(is_live);
@@ -60,7 +61,7 @@ impl IdempotencyStore {
         lock(&self.entries).entry(name).or_default().clone()
     }
 
-    /// Drops the entries whose sessions have ended.
+    /// Drops the entries that no request uses and that have no live session.
     pub fn prune(&self, is_live: impl Fn(Uuid) -> bool) {
         lock(&self.entries).retain(|_, entry| {
             // A request that holds the entry or waits for it holds a clone.

@@ -1,16 +1,16 @@
 //! The acts of the service: what is done with sessions, whoever asks and over whatever line.
 //!
-//! In: who asks, and what is asked, parsed. Out: estimates, sessions and snapshots, or small errors. The acts know
-//! neither HTTP nor sockets. [`SessionService`] is the one door: `find`, `open`, `advance`, `read`, `refresh`, `fence`,
-//! `end` and `track`.
+//! In: the owner, and the parsed request. Out: estimates, sessions and snapshots, or small errors. The acts know
+//! neither HTTP nor sockets. All are methods of [`SessionService`]: `find`, `open`, `advance`, `read`, `refresh`,
+//! `fence`, `end` and `track`.
 //!
-//! [`SessionService::advance`] is the heart: lock, track on a copy, commit, [reconcile](crate::store), and
-//! swap the copy in. Without a store the commit is the swap alone. So a refused frame changes nothing, and neither does
-//! one whose commit failed.
+//! [`SessionService::advance`] locks the session, tracks on a copy of its state, commits to the store,
+//! [reconciles](crate::store), and makes the copy the session's state. Without a store there is no commit. So neither a
+//! refused frame nor a failed commit changes the session.
 //!
-//! What can go wrong: another replica was first (the session goes on from the store's state, and the frames are looked
-//! at again), the store is away ([`ActError::Store`]), the time of the request is over while work is done (it stops
-//! between two frames, and its copy is dropped).
+//! What can go wrong: another replica committed a frame first (the session goes on from the store's state, and the
+//! frames are tracked again), the store is away ([`ActError::Store`]), the time of the request ends during the work
+//! (the work stops between two frames, and its copy is dropped).
 
 mod advance;
 mod error;

@@ -1,4 +1,5 @@
-//! Opens sessions: once for each name, so that a request that comes again gets the same answer.
+//! Opens sessions: one for each name (idempotency key or id), so that a request that is sent again gets the same
+//! answer.
 
 use super::error::OpenError;
 use super::idempotency::{CreationKey, id_of};
@@ -17,17 +18,16 @@ use uuid::Uuid;
 
 /// How many sessions a client may have.
 pub trait SessionQuota: Debug + Send + Sync {
-    /// Whether it may have one more.
+    /// Whether the client may have one more session.
     ///
     /// # Errors
-    /// It may not.
+    /// The client has as many as it may.
     fn check(&self) -> Result<(), OpenError>;
 
-    /// Takes the places of a session with so many targets, whose state takes so many bytes, until what is returned is
-    /// dropped.
+    /// Counts a session with `targets` targets and a state of `bytes` bytes, until the returned reservation is dropped.
     ///
     /// # Errors
-    /// There are not so many left.
+    /// The client, or the service, has not so many left.
     fn reserve(&self, targets: usize, bytes: usize) -> Result<Reservation, OpenError>;
 
     /// What the client may have in a store that replicas share.
@@ -37,13 +37,14 @@ pub trait SessionQuota: Debug + Send + Sync {
 /// A request to open a session.
 #[derive(Debug)]
 pub struct OpenRequest {
-    /// What the client calls the session, where it gives it a name.
+    /// The idempotency key or the id that the client gives, if any.
     pub key: Option<CreationKey>,
-    /// Whose the session will be.
+    /// The session's owner.
     pub owner: Owner,
-    /// A digest of what the session begins with: a request of the same name is the same request where this is equal.
+    /// A digest of what the session begins with. Two requests of one name are the same request if their digests are
+    /// equal.
     pub digest: [u8; 32],
-    /// What it begins with.
+    /// What the session begins with.
     pub start: Start,
     /// How many sessions the client may have.
     pub quota: Arc<dyn SessionQuota>,
@@ -64,7 +65,8 @@ impl SessionService {
     /// Opens a session, or finds the one that the same request opened before.
     ///
     /// # Errors
-    /// What it begins with cannot be used, there is no room, or another request has opened one under this name.
+    /// The frame, the boxes, the parameters or the snapshot cannot be used, there is no room, or another request has
+    /// opened a session under this name.
     pub async fn open(&self, request: OpenRequest) -> Result<Opened, OpenError> {
         let Some(key) = request.key.clone() else {
             let session = self.open_as(request, new_id()).await?;
@@ -126,8 +128,8 @@ impl SessionService {
         quota.check()
     }
 
-    /// The id of the session that an idempotency key names: of the one that is open, or a new one. With a store, all
-    /// replicas find the same, and a request that opens nothing leaves nothing there.
+    /// The id of the session that an idempotency key names: that of the live session, or a new id. With a store the id
+    /// is computed from the key, so all replicas find the same one, and a request that opens nothing stores nothing.
     async fn id_of_key(
         &self,
         owner: &Owner,
@@ -206,7 +208,7 @@ impl SessionService {
     }
 }
 
-/// Whether the open session of this name was opened by the same request.
+/// Refuses a request whose name another request has used.
 fn check_same(
     session: &Session,
     owner: &Owner,

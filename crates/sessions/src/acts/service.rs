@@ -1,4 +1,4 @@
-//! What the acts share: the parts of the service, what they measure, and work on its worker threads.
+//! What the acts share: the parts of the service, its metrics, and the way to run work on its worker threads.
 
 use super::error::ActError;
 use super::idempotency::IdempotencyStore;
@@ -14,16 +14,16 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// The one door to sessions. Clones are the same service.
+/// All acts on sessions are methods of this service. Clones share its parts.
 #[derive(Debug, Clone)]
 pub struct SessionService(Arc<ServiceParts>);
 
 /// What a request may take, and how sessions are kept.
 #[derive(Debug, Clone)]
 pub struct ServiceSettings {
-    /// Time for one request's work, the waiting included.
+    /// Most time that one request may take, waiting included.
     pub work_timeout: Duration,
-    /// Processor time of one request.
+    /// Most processor time that one request may take.
     pub max_request_cpu: Duration,
     /// The limits of each frame.
     pub frame: bagtrack_ingest::Limits,
@@ -31,7 +31,7 @@ pub struct ServiceSettings {
     pub max_request_pixels: u64,
     /// Most stored answers of a session.
     pub max_answers: usize,
-    /// The state is written to the store at every so many frames.
+    /// The state is written to the store once every so many frames, at least 1.
     pub store_every: u64,
 }
 
@@ -48,17 +48,17 @@ pub struct ServiceParts {
     pub admission: Admission,
     /// The open streams.
     pub streams: OpenStreams,
-    /// The sessions by the names under which they were opened.
+    /// The sessions by the idempotency keys or ids under which they were opened.
     pub opened: IdempotencyStore,
     /// The keys that sign snapshots.
     pub keys: Arc<MacKeys>,
-    /// What gives a second opinion in every session that is opened, where there is one.
+    /// The expert tracker whose opinion is asked in every session that is opened, where there is one.
     pub expert: Option<Arc<dyn Expert>>,
-    /// What decoding and tracking measure.
+    /// The metrics of decoding and tracking.
     pub tracking: TrackingMetrics,
     /// Time in the queue.
     pub queue_wait: Histogram,
-    /// Set from the moment that the service was asked to end.
+    /// Set when the service is asked to end.
     pub draining: AtomicBool,
 }
 
@@ -75,7 +75,7 @@ impl SessionService {
         Self(Arc::new(parts))
     }
 
-    /// From now on no session is opened, and every frame's state is written to the store.
+    /// From now on no session is opened, and the state is written to the store after every request with frames.
     pub fn drain(&self) {
         self.draining.store(true, Ordering::Release);
     }
@@ -85,18 +85,18 @@ impl SessionService {
         self.draining.load(Ordering::Acquire)
     }
 
-    /// Drops what is kept on behalf of sessions that have ended.
+    /// Drops the names of sessions that have ended.
     pub fn prune(&self) {
         self.opened.prune(|id| self.registry.is_live(id));
     }
 
     /// Runs `work` on a worker, within the time that a request may take.
     ///
-    /// The deadline ends the waiting at once. Work that has begun looks at it between frames, and at whether its client
-    /// has gone. Until it has ended it keeps its permits and the session's lock.
+    /// At the deadline the caller gets its error at once. Work that has begun checks the deadline between frames, and
+    /// whether its client has gone. It keeps its permits and the session's lock until it ends.
     ///
     /// # Errors
-    /// Its time is over, it waited too long for a worker, it panicked, or its own error.
+    /// Time is over, the work waited too long for a worker or panicked; or the error of `work` itself.
     pub async fn run<T, E, F>(&self, queue: QueuePermit, work: F) -> Result<T, E>
     where
         T: Send + 'static,
@@ -123,20 +123,20 @@ impl SessionService {
     }
 }
 
-/// What decoding and tracking measure. Clones are the same metrics.
+/// The metrics of decoding and tracking. Clones share them.
 #[derive(Debug, Clone)]
 pub struct TrackingMetrics {
     /// Seconds to decode a frame.
     pub decode: Histogram,
     /// Seconds of processor time to track a target through a frame.
     pub step: Histogram,
-    /// Answers of targets that are tracked.
+    /// Answers with the status `Tracking`, one for each target and frame.
     pub tracking: Counter,
-    /// Answers that are uncertain.
+    /// Answers with the status `Uncertain`.
     pub uncertain: Counter,
-    /// Answers of targets that are out of sight.
+    /// Answers with the status `Lost`.
     pub lost: Counter,
-    /// Times that a target went out of sight.
+    /// How often a target's status became `Lost`.
     pub losses: Counter,
 }
 
@@ -153,7 +153,7 @@ impl TrackingMetrics {
         }
     }
 
-    /// Decodes with `work`, and measures it.
+    /// Runs `work`, which decodes a frame, and measures its time.
     pub fn decoding<T>(&self, work: impl FnOnce() -> T) -> T {
         let started = clock::now();
         let result = work();
@@ -161,8 +161,8 @@ impl TrackingMetrics {
         result
     }
 
-    /// Frames were tracked, with this processor time for each step of a tracker. `before` is the answer to the frame
-    /// before them.
+    /// Counts tracked frames. `before` is the answer to the frame before them, `answers` are theirs, `steps` is the
+    /// processor time of each step of a tracker.
     pub fn tracked(&self, before: &Estimates, answers: &[Estimates], steps: &[Duration]) {
         for step in steps {
             self.step.record(step.as_secs_f64());

@@ -15,7 +15,7 @@ pub enum Start {
         file: Bytes,
         /// The targets' boxes.
         boxes: Boxes,
-        /// The trackers' parameters, with the seed of the first one.
+        /// The trackers' parameters; the seed is that of the first target's tracker.
         params: Box<Params>,
     },
     /// A signed snapshot.
@@ -23,7 +23,7 @@ pub enum Start {
 }
 
 impl Start {
-    /// How many targets there will be, as far as that is known.
+    /// How many targets the session will have; 1 for a snapshot, which is not read yet.
     pub(super) fn target_count(&self) -> usize {
         match self {
             Self::Frame { boxes, .. } => boxes.as_slice().len(),
@@ -37,7 +37,7 @@ impl Start {
         }
     }
 
-    /// The state of the session that begins so.
+    /// The state of a session that begins with this.
     ///
     /// # Errors
     /// The frame, a box, a parameter or the snapshot cannot be used, or the work was stopped.
@@ -83,7 +83,7 @@ impl Start {
             Fingerprint::of(file),
             boxes,
             params,
-            // Sessions with the paper's equations have none.
+
             expert.filter(|_| params.takes_expert()),
             check,
         );

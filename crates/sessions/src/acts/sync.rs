@@ -1,5 +1,5 @@
-//! Synchronises cached sessions with the store: brings them up to it, renews their time to live, and writes their
-//! states outside of requests.
+//! Synchronises the sessions in memory with the store: loads newer states, renews the time to live, and writes states
+//! outside of requests.
 //!
 //! Memory is a cache of the store: another replica may have gone on with a session that is in memory here.
 
@@ -15,13 +15,15 @@ use crate::{
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How often a session is fenced: other replicas may be there first each time.
+/// How often fencing a session is tried: each time another replica may commit a frame first.
 const MAX_ATTEMPTS: usize = 4;
-/// A session without a record has expired if it had so little time left: answers and clocks are not exact.
+/// A session whose record is gone has expired if no more than this was left of its time to live, and was lost
+/// otherwise. The second allows for inexact clocks and slow answers.
 const LATE: Duration = Duration::from_secs(1);
 
 impl SessionService {
-    /// Waits for the session, and brings its state up to the store's. `takes_over` says that frames follow here.
+    /// Waits for the session's lock, and brings its state up to the store's. `takes_over` is true where frames will be
+    /// tracked here.
     pub(super) async fn lock_newest(
         &self,
         permit: SessionPermit,
@@ -33,10 +35,10 @@ impl SessionService {
         self.follow(locked, step, flow).await
     }
 
-    /// Waits for the session, brings its state up to the store's, and runs `read` with it on a worker.
+    /// Waits for the session's lock, brings its state up to the store's, and runs `read` on the state on a worker.
     ///
     /// # Errors
-    /// The session has ended, the store gives no answer, time is over, or that of `read`.
+    /// The session has ended, the store gives no answer, time is over, or the error of `read` itself.
     pub async fn read<T, E, F>(
         &self,
         permit: SessionPermit,
@@ -70,8 +72,8 @@ impl SessionService {
             .await
     }
 
-    /// Brings the last answer of a session up to the store's. Waits for no frame that is being tracked here, unless the
-    /// store has a newer one. `permit` is that of a request that is at the session already.
+    /// Brings the last answer of a session up to the store's. Waits for a frame that is being tracked here only if the
+    /// store has a newer one. `permit` is the permit of the caller's request, if it has one.
     ///
     /// # Errors
     /// The session has ended, or the store gives no answer.
@@ -95,7 +97,7 @@ impl SessionService {
                     None => session.read_permit()?,
                 };
                 let locked = permit.lock().await?;
-                // It may be this replica that has noted the newer frame meanwhile.
+                // This replica may itself have committed the newer frame meanwhile.
                 let step = match session.version() == before {
                     true => step,
                     false => self.ask(session, false).await,
@@ -106,7 +108,8 @@ impl SessionService {
         }
     }
 
-    /// Waits for the session with its newest state, and lets no other replica go on from its own copy.
+    /// Waits for the session's lock, brings its state up to the store's, and begins the record's next generation, so
+    /// that no other replica goes on from its own copy.
     ///
     /// # Errors
     /// The session has ended, the store gives no answer, or time is over.
@@ -151,13 +154,13 @@ impl SessionService {
         Err(SessionBusy.into())
     }
 
-    /// A session lives on where there was no room or time for its frame. Otherwise a refused frame does not keep it
-    /// alive.
+    /// Renews a session's time to live, in the store too if `in_store`. For frames that were refused for want of room
+    /// or time; other refused frames do not keep their session alive.
     pub async fn renew(&self, session: &Session, in_store: bool) {
         session.renew();
         if let (true, Some(store), Some(version)) = (in_store, &self.store, session.version()) {
             let ttl = Some(self.registry.idle_lease());
-            // Without an answer it lives as long as before.
+            // If the store gives no answer, the record's time to live is not renewed.
             let _ = store.check(session.name(), version, false, ttl).await;
         }
     }
@@ -174,7 +177,7 @@ impl SessionService {
         reconcile(session.name().incarnation, Intent::Newest, outcome)
     }
 
-    /// Does a step with a locked session.
+    /// Follows the store's `step` with a locked session: notes its time to live, or loads the store's state.
     async fn follow(
         &self,
         locked: LockedSession,
@@ -195,14 +198,14 @@ impl SessionService {
         }
     }
 
-    /// Why a session cannot be used after this step. It leaves memory where it has gone from the store.
+    /// Why a session cannot be used after this step. Drops the session from memory, unless the store gave no answer.
     pub(super) fn refusal(&self, session: &Arc<Session>, step: Step) -> ActError {
         let error = match step {
             Step::Unavailable(unavailable) => return unavailable.into(),
             Step::Gone(Gone::Ended) => NoSession::Unknown.into(),
             Step::Gone(Gone::NoRecord) if session.ttl() > LATE => NoSession::Lost.into(),
             Step::Gone(Gone::NoRecord) => NoSession::Expired.into(),
-            // The next request finds the new one.
+            // For a replaced session: the next request with this id finds the new one.
             Step::Replaced(_) | Step::Commit(_) | Step::GoOn(_) | Step::Conflict(_) => {
                 SessionBusy.into()
             }
@@ -233,7 +236,7 @@ impl SessionService {
         }
     }
 
-    /// Writes a session's state as it is. False where the store has another version.
+    /// Writes a session's state to the store. False if the store has another version of the session.
     async fn write(&self, locked: &mut LockedSession) -> Result<bool, StoreUnavailable> {
         let session = locked.session().clone();
         let (Some(store), Some(before)) = (&self.store, session.version()) else {
@@ -246,7 +249,8 @@ impl SessionService {
             frame,
             state: Some(bytes.into()),
             takes_over: false,
-            // What is left by this clock may be nothing after a jump, and the store would drop the record.
+            // The full time, not what is left of it: after a jump of this machine's clock that may be nothing, and the
+            // store would drop the record.
             ttl: self.registry.idle_lease(),
         };
         let is_written = matches!(store.commit(commit).await?, Outcome::Committed(_));

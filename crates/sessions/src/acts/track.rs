@@ -9,10 +9,10 @@ use crate::{Boxes, Estimates, QueuePermit, SessionState, WorkMeter};
 use bagtrack_tracker::{Params, box_warnings};
 use bytes::Bytes;
 
-/// Where a track without a session stands.
+/// Where a track without a session begins.
 #[derive(Debug)]
 pub enum TrackFrom {
-    /// It begins with these targets in the first frame.
+    /// With these targets in the first frame.
     Start(Boxes, Box<Params>),
     /// At a signed snapshot; the user may correct a box in the first frame.
     Snapshot(Bytes, Option<GivenBox>),
@@ -30,10 +30,11 @@ pub struct TrackedAway {
 }
 
 impl SessionService {
-    /// Tracks through frames, and runs `respond` with the answers on the same worker. Nothing is kept.
+    /// Tracks through frames, and runs `respond` with the answers on the same worker. The service keeps no state of it.
     ///
     /// # Errors
-    /// The frames or where the track stands cannot be used, time is over, or that of `respond`.
+    /// The frames, the boxes, the parameters or the snapshot cannot be used, time is over, or the error of `respond`
+    /// itself.
     pub async fn track<T, E, F>(
         &self,
         queue: QueuePermit,
