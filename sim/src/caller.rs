@@ -1,4 +1,5 @@
-//! A caller: it follows objects with the real client, and keeps account of what it sent and what it was told.
+//! A caller: it tracks objects with the real client, and keeps account of the frames that it sent and the answers that
+//! it got.
 
 use crate::chance::Chance;
 use crate::faults::Rates;
@@ -22,15 +23,15 @@ pub(crate) const TIMEOUT: Duration = Duration::from_secs(5);
 pub struct Caller {
     pub name: String,
     pub client: Client,
-    /// Its way to the replicas, for streams.
+    /// The network to the replicas, for streams; requests go through the client.
     pub wire: Wire,
-    /// The share of its sessions whose frames it sends over a stream.
+    /// The probability that the frames of a session are sent over streams.
     pub streams: f64,
     pub chance: Chance,
     pub rates: Rates,
     pub trace: Trace,
     pub journal: Journal,
-    /// Whether faults have ended.
+    /// Whether the faults of the run have ended.
     pub is_quiet: Arc<AtomicBool>,
     /// How long a session lives without a frame.
     pub idle: Duration,
@@ -40,24 +41,24 @@ pub struct Caller {
 #[derive(Debug, Clone)]
 pub(crate) struct Account {
     pub(crate) opening: Opening,
-    /// What was sent up to the last answer; by frame.
+    /// The frames up to the last one that was answered, by frame number.
     pub(crate) sent: Vec<Sent>,
-    /// What may have been sent instead: a stream does not tell which frames it has tracked.
+    /// Other possible values of `sent`: where a stream broke, its answers do not tell which of its frames were tracked.
     pub(crate) others: Vec<Vec<Sent>>,
-    /// What was sent after it, and had no answer.
+    /// The frames after `sent`, which have no answer yet.
     pub(crate) unanswered: Vec<Sent>,
-    /// Which picture a stream sends next. It sends none a second time.
+    /// The next picture that a stream sends. Streams send no picture twice.
     pub(crate) drawn: usize,
     pub(crate) answers: Vec<(usize, String)>,
-    /// When the service had a sign of life last.
+    /// When the caller last heard from the service about this session.
     pub(crate) touched: Instant,
 }
 
 /// Why a session does not go on.
 pub(crate) enum Ended {
-    /// It has expired, which may be.
+    /// It has expired, as it may after so long a pause.
     Expired,
-    /// It has not, and is gone.
+    /// It is gone, though it cannot have expired; this says how that was noticed.
     Lost(String),
 }
 
@@ -82,7 +83,7 @@ impl Caller {
             .expect("the addresses are some")
     }
 
-    /// Follows some objects, one after the other.
+    /// Tracks some objects, one after the other.
     pub async fn run(self) {
         for _ in 0..self.chance.between(1..3) {
             sleep(self.chance.millis(0..2000)).await;
@@ -129,7 +130,7 @@ impl Caller {
         }
     }
 
-    /// Sends frames, until it has enough.
+    /// Sends some frames with requests, then ends the session or leaves it.
     async fn go_on(&self, mut session: Session, mut account: Account) {
         for _ in 0..self.chance.between(3..14) {
             if self.chance.happens(0.3) {
@@ -141,7 +142,7 @@ impl Caller {
         }
         let ended = match self.chance.happens(0.8) {
             true => self.end(session, &mut account).await.err(),
-            // It expires.
+            // The session is left to expire.
             false => None,
         };
         self.finish(account, ended);
@@ -206,7 +207,7 @@ impl Caller {
         )
     }
 
-    /// A snapshot of the session becomes another one, which ends for itself.
+    /// Opens another session from a snapshot of this one, tracks one frame in it, and ends it.
     async fn snapshot(&self, session: &mut Session, account: &mut Account) -> Result<(), Ended> {
         if !account.unanswered.is_empty() {
             return Ok(());
@@ -223,7 +224,7 @@ impl Caller {
             answers: Vec::new(),
             ..account.clone()
         };
-        // Where the state is not written at each frame, another replica may have an older one.
+        // Where not each state is written to the store, the snapshot may come from a replica with an older state.
         copy.sent.truncate(other.frame() as usize + 1);
         let ended = match self.track(&mut other, &mut copy).await {
             Ok(()) => self.end(other, &mut copy).await.err(),
@@ -234,7 +235,7 @@ impl Caller {
     }
 
     async fn end(&self, mut session: Session, account: &mut Account) -> Result<(), Ended> {
-        // With an answer to all before.
+        // The answer to one more frame makes sure that all earlier frames are accounted for.
         self.track(&mut session, account).await?;
         match session.end().await {
             Ok(()) => Ok(()),
@@ -242,7 +243,7 @@ impl Caller {
         }
     }
 
-    /// Waits for the answer; now and then not long enough. None then.
+    /// Waits for the answer of `call`. `None` if the caller gave up, which it does now and then.
     async fn patiently<T>(
         &self,
         call: impl Future<Output = Result<T, ClientError>>,
@@ -280,7 +281,7 @@ impl Caller {
         }
     }
 
-    /// What no answer means: the session goes on, or it has ended.
+    /// What an error instead of an answer means for the session: it goes on, or it has ended.
     pub(crate) fn refused(&self, account: &Account, error: ClientError) -> Result<(), Ended> {
         match error {
             ClientError::Refused(problem) if matches!(problem.status, 404 | 410) => {
@@ -291,16 +292,17 @@ impl Caller {
         }
     }
 
-    /// What it means that the service does not have the session.
+    /// Why the service has no such session: it has expired, or it is lost, which is a fault.
     pub(crate) fn gone(&self, account: &Account, why: String) -> Ended {
-        // The lease began when the service answered, which the caller may have heard one time-out later.
+        // The session's time to live began when the service answered; the caller may have heard the answer one time-out
+        // later.
         match account.touched.elapsed() + TIMEOUT + Duration::from_secs(1) >= self.idle {
             true => Ended::Expired,
             false => Ended::Lost(why),
         }
     }
 
-    /// Compares what was answered with the tracker alone.
+    /// Compares the answers with those of the tracker alone.
     pub(crate) fn finish(&self, account: Account, ended: Option<Ended>) {
         if let Some(Ended::Lost(why)) = &ended {
             self.fault(&format!("a session is gone: {why}"));

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// The choices. Clones draw from the same numbers: in one thread they do so in the same order each time.
+/// The source of random choices. Clones draw from one sequence, in a single thread always in the same order.
 #[derive(Debug, Clone)]
 pub struct Chance(Arc<Mutex<ChaCha8Rng>>);
 
@@ -16,7 +16,8 @@ impl Chance {
     }
 
     pub fn happens(&self, probability: f64) -> bool {
-        // Without a draw where it is certain, so that a fault that is off changes nothing else.
+        // Nothing is drawn for a probability of 0, so a fault that is switched off leaves all other choices as they
+        // are.
         probability > 0.0 && self.draw(|rng| rng.random_bool(probability))
     }
 
@@ -29,7 +30,7 @@ impl Chance {
         Duration::from_millis(self.between(range))
     }
 
-    /// One of these, of which there is one.
+    /// One of these; there must be at least one.
     pub fn one_of<'a, T>(&self, among: &'a [T]) -> &'a T {
         &among[self.between(0..among.len())]
     }

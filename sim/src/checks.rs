@@ -1,4 +1,4 @@
-//! What must hold when all callers have gone.
+//! Checks at the end of a run, when all callers have gone.
 
 use crate::cluster::{Cluster, REPLICAS};
 use crate::journal::Journal;
@@ -7,7 +7,7 @@ use axum::body::Body;
 use bagtrack_sessions::clock::sleep;
 use http::Request;
 
-/// What is zero when nobody uses a replica.
+/// The metrics that are zero when nobody uses a replica.
 const IN_USE: [&str; 6] = [
     "bagtrack_sessions",
     "bagtrack_session_bytes",
@@ -17,9 +17,9 @@ const IN_USE: [&str; 6] = [
     "bagtrack_streams",
 ];
 
-/// After all sessions have ended or expired no replica holds anything for them, nor does the store.
+/// Waits until all sessions have expired, then checks that neither a replica nor the store holds anything for them.
 pub async fn all_is_given_back(cluster: &Cluster, journal: &Journal) {
-    // The sweeper comes each quarter of the time.
+    // Sessions expire after this time, and the sweeper runs four times in it: twice the time suffices.
     sleep(IDLE * 2).await;
     for index in 0..REPLICAS {
         let Some(replica) = cluster.at(index) else {

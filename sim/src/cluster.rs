@@ -7,7 +7,7 @@ use std::time::Duration;
 
 pub const REPLICAS: usize = 3;
 
-/// The replicas. Clones are the same.
+/// The replicas. Clones share them.
 #[derive(Debug, Clone)]
 pub struct Cluster {
     setup: Setup,
@@ -16,9 +16,9 @@ pub struct Cluster {
 
 #[derive(Debug, Default)]
 struct Place {
-    /// None while it is not running.
+    /// `None` while no replica runs here.
     replica: Option<Replica>,
-    /// Whether a load balancer sends new requests there.
+    /// Whether the load balancer sends new requests to this place.
     is_ready: bool,
     lives: u32,
 }
@@ -40,7 +40,7 @@ impl Cluster {
         &self.setup
     }
 
-    /// Starts one again that does not run.
+    /// Starts a replica in this place, unless one lives there.
     pub async fn start_one(&self, index: usize) {
         let lives = {
             let place = &mut self.lock()[index];
@@ -61,13 +61,13 @@ impl Cluster {
         }
     }
 
-    /// The replica in this place, where it lives.
+    /// The replica in this place, if one lives there.
     pub fn at(&self, index: usize) -> Option<Replica> {
         let replica = self.lock()[index].replica.clone();
         replica.filter(|replica| !replica.life.is_dead())
     }
 
-    /// The places to which a load balancer sends requests.
+    /// The indices of the places to which the load balancer sends requests.
     pub fn ready(&self) -> Vec<usize> {
         let places = self.lock();
         let is_ready = |place: &Place| {
@@ -92,7 +92,7 @@ impl Cluster {
         self.lock()[index].replica = None;
     }
 
-    /// Asks one to end: it does after this time.
+    /// Asks a replica to end, which it does after `delay`.
     pub async fn drain(&self, index: usize, delay: Duration) {
         let Some(replica) = self.at(index) else {
             return;

@@ -1,23 +1,23 @@
-//! What goes wrong in a run, and how often. Each seed draws some of it: a run with all faults at once would never come
-//! far.
+//! The kinds of faults of a run, and how often they happen. Each seed draws some kinds: a run with all at once would
+//! not get far.
 
 use crate::chance::Chance;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Probabilities for each message. Clones are switched off together.
+/// The probability of each fault, for each message. Clones are switched off together.
 #[derive(Debug, Clone)]
 pub struct Rates {
     is_on: Arc<AtomicBool>,
     /// A message to or from the store takes long.
     pub late: f64,
-    /// A script does not come to the store.
+    /// A script does not reach the store.
     pub store_lost: f64,
     /// A script ran, and its answer is lost.
     pub store_answer_lost: f64,
-    /// A script that came, or was given up, comes once more.
+    /// A script reaches the store again, whether its first message arrived or was lost.
     pub store_doubled: f64,
-    /// A request does not come to a replica.
+    /// A request does not reach a replica.
     pub request_lost: f64,
     pub answer_lost: f64,
     pub request_doubled: f64,
@@ -27,12 +27,13 @@ pub struct Rates {
     pub given_up: f64,
 }
 
-/// What happens to replicas and the store: how often in a hundred events of a run.
+/// The faults of replicas and the store, each with its weight: the probability that an event is this fault is its share
+/// of the sum.
 #[derive(Debug, Clone)]
 pub struct Events {
-    /// A replica is killed, at once or at some await.
+    /// A replica is killed, at once or at a random await point.
     pub kill: u32,
-    /// A replica is asked to end, and does some time later.
+    /// A replica is asked to end, and ends some time later.
     pub drain: u32,
     pub store_away: u32,
     pub store_slow: u32,

@@ -1,20 +1,22 @@
-//! What the store has had and what replicas have answered, whoever got it; and what contradicts the promises.
+//! Which frames the store has had and what replicas have answered, whether or not the caller got the answer; and the
+//! broken promises.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The journal. Clones are the same.
+/// The journal. Clones share its pages.
 #[derive(Debug, Clone, Default)]
 pub struct Journal(Arc<Mutex<Pages>>);
 
 #[derive(Debug, Default)]
 struct Pages {
-    /// The frame of each session's record, as it was written last.
+    /// The last frame number of each session's record, as it was written last.
     records: BTreeMap<String, u64>,
-    /// Sessions with the frames that the store has had, and the frames whose states it has had.
+    /// Pairs of session and frame: in `frames` those whose number the store has had, in `checkpoints` those whose state
+    /// it has had.
     frames: BTreeSet<(String, u64)>,
     checkpoints: BTreeSet<(String, u64)>,
-    /// By session and frame: what was sent, and the answer.
+    /// By session and frame: the digest of what was sent, and the first answer.
     answers: BTreeMap<(String, u64), (u64, String)>,
     answered: u64,
     faults: Vec<String>,
@@ -34,10 +36,10 @@ pub struct Given {
 }
 
 impl Journal {
-    /// The store has this frame of a session, and its state at the checkpoint.
+    /// Notes that the store has this frame of a session, and its state at the checkpoint.
     pub fn stored(&self, session: &str, frame: u64, checkpoint: u64) {
         let mut pages = self.lock();
-        // A write with several frames has those before its last, too.
+        // A request with several frames writes only the last number: the store has those before it, too.
         let before = pages.records.insert(session.to_owned(), frame);
         let first = before.map_or(0, |before| before + 1).min(frame);
         let taken = (first..=frame).map(|frame| (session.to_owned(), frame));
@@ -45,8 +47,9 @@ impl Journal {
         pages.checkpoints.insert((session.to_owned(), checkpoint));
     }
 
-    /// A replica has answered. With a store nothing is answered that it does not have; and no frame twice in two ways.
-    /// A number may be another frame's only where the state is not written each time, and the first has got lost.
+    /// Checks a replica's answer. With a store, the store must have the frame and the checkpoint before the answer is
+    /// given. A frame number has one answer only; but where not each state is written, a frame may get lost, and
+    /// another frame may then have its number and another answer.
     pub fn answered(&self, given: Given, has_store: bool, writes_each: bool) {
         let mut pages = self.lock();
         pages.answered += 1;
@@ -69,7 +72,7 @@ impl Journal {
         }
     }
 
-    /// Something contradicts the promises.
+    /// Notes a broken promise.
     pub fn fault(&self, fault: String) {
         self.lock().faults.push(fault);
     }

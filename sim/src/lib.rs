@@ -1,5 +1,5 @@
 //! A deterministic simulation: three replicas of the real service, the real store over a simulated Redis, and the real
-//! Rust client, in one thread on a simulated clock. Everything that happens follows from a seed.
+//! Rust client, in one thread on a simulated clock. All random choices are drawn from one seed.
 //!
 //! | who | what is real | what is simulated |
 //! |---|---|---|
@@ -10,13 +10,13 @@
 //! | the store (`redis`) | its Lua scripts | the server: keys, times to live, and whether it is there |
 //! | the nemesis (`nemesis`) | | kills, drains, restarts, clocks that jump |
 //!
-//! After each run `journal`, `caller` and `checks` have compared what was promised with what happened: every
-//! answer is that of the tracker alone (`replay`), no number is answered with two boxes, nothing is answered that the
-//! store does not have, every session goes on until its caller ends it or it expires, and nothing is held in the end.
+//! In each run `journal`, `caller` and `checks` check what the service promises: every answer is that of the tracker
+//! alone (`replay`), no frame number has two different answers, no frame is answered before the store has it, every
+//! session lives until its caller ends it or it expires, and no replica holds anything at the end.
 //!
-//! The same seed does the same again, since one thread runs all tasks in order; the time is tokio's, paused; and all
-//! random numbers are drawn from the seed, those of the service by `bagtrack_sessions::random`. Work takes simulated
-//! time only: what the scheduler does with measured times is left to its own tests.
+//! A run of a seed can be repeated exactly: one thread runs all tasks in order, the clock is tokio's paused clock, and
+//! all random numbers are drawn from the seed, those of the service by `bagtrack_sessions::random`. Work takes
+//! simulated time only: what the scheduler does with measured times is left to its own tests.
 
 mod caller;
 mod chance;

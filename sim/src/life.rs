@@ -1,4 +1,4 @@
-//! The life of a replica: it ends at any await.
+//! The life of a replica, which can end at any await point of its tasks.
 
 use std::io;
 use std::pin::Pin;
@@ -6,26 +6,26 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use tokio::io::{AsyncRead, AsyncWrite, DuplexStream, ReadBuf};
 
-/// The life. Clones are the same.
+/// The life. Clones share it.
 #[derive(Debug, Clone, Default)]
 pub struct Life(Arc<Mutex<State>>);
 
 #[derive(Debug, Default)]
 struct State {
     is_dead: bool,
-    /// How often its tasks run until it ends, where that is decided.
+    /// How many more polls of its tasks the replica lives, where its end is decided.
     polls_left: Option<u32>,
     wakers: Vec<Waker>,
 }
 
-/// A task of a replica. It gives nothing when the replica has died.
+/// A task of a replica. Its result is `None` if the replica has died.
 pub struct Mortal<T> {
     life: Life,
     task: Option<Pin<Box<dyn Future<Output = T> + Send>>>,
 }
 
 impl Life {
-    /// It ends now. What its tasks hold is dropped when they are next asked.
+    /// Ends the life now. What its tasks hold is dropped when they are next polled.
     pub fn end(&self) {
         let mut state = self.lock();
         state.is_dead = true;
@@ -34,7 +34,7 @@ impl Life {
         wakers.into_iter().for_each(Waker::wake);
     }
 
-    /// It ends after its tasks have run so often: in the middle of some await.
+    /// Ends the life after so many polls of its tasks: at a random await point.
     pub fn end_after(&self, polls: u32) {
         self.lock().polls_left = Some(polls);
     }
@@ -43,7 +43,7 @@ impl Life {
         self.lock().is_dead
     }
 
-    /// Whether it has ended, or its end is decided.
+    /// Whether the life has ended, or its end is decided.
     pub fn is_doomed(&self) -> bool {
         let state = self.lock();
         state.is_dead || state.polls_left.is_some()
@@ -56,7 +56,7 @@ impl Life {
         }
     }
 
-    /// One of its tasks is to run. Whether it may.
+    /// Counts a poll of one of the tasks. False if the replica is dead.
     fn goes_on(&self, context: &Context) -> bool {
         let mut state = self.lock();
         if let Some(left) = &mut state.polls_left {
@@ -99,7 +99,7 @@ impl<T> Future for Mortal<T> {
     }
 }
 
-/// A connection of a replica. It is cut when the replica has died.
+/// The replica's end of a connection, which fails once the replica has died.
 #[derive(Debug)]
 pub struct MortalStream {
     life: Life,

@@ -1,4 +1,4 @@
-//! A connection from a caller to a replica, over a network with faults: what a stream goes over.
+//! A connection from a caller to a replica, over a network with faults. Streams use it.
 
 use crate::network::Wire;
 use bagtrack_sessions::clock::sleep;
@@ -6,10 +6,10 @@ use std::future::pending;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, DuplexStream, duplex, split};
 use tokio::sync::watch;
 
-/// What a line holds that its other end has not read.
+/// The most bytes that a line holds until its other end reads them.
 const BUFFER: usize = 64 << 10;
 
-/// What became of some bytes.
+/// What happens to bytes on the line.
 enum Fate {
     Arrives,
     /// The line breaks, and both ends notice.
@@ -19,7 +19,7 @@ enum Fate {
 }
 
 impl Wire {
-    /// The caller's end of a connection to some replica that is ready; none where there is none.
+    /// Connects to a random replica that is ready, and returns the caller's end; `None` if no replica is ready.
     pub fn connect(&self) -> Option<DuplexStream> {
         let ready = self.cluster.ready();
         let chance = &self.cluster.setup().chance;
@@ -46,8 +46,8 @@ impl Wire {
         Some(caller)
     }
 
-    /// Carries bytes one way, in order, until their end or until the line breaks. What is on its way when the sender
-    /// has gone still arrives.
+    /// Carries bytes one way, in order, until the sender ends or the line breaks. Bytes on their way still arrive after
+    /// the sender has gone.
     async fn convey(
         self,
         mut from: impl AsyncRead + Unpin,
@@ -72,7 +72,7 @@ impl Wire {
             let fate = self.fate(lost);
             let arriving = match fate {
                 Fate::Arrives => length,
-                // It is cut within a message.
+                // The bytes may be cut off in the middle of a message.
                 Fate::Breaks | Fate::Silent => self.cluster.setup().chance.between(0..length),
             };
             if *is_broken.borrow() || to.write_all(&bytes[..arriving]).await.is_err() {
@@ -89,7 +89,7 @@ impl Wire {
         }
     }
 
-    /// That the sender has gone is often heard late: its machine is away.
+    /// The end of a line often arrives late: a machine that has gone closes no connections.
     async fn end_late(&self) {
         let setup = self.cluster.setup();
         if setup.rates.happens(&setup.chance, 0.5) {

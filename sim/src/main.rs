@@ -44,7 +44,7 @@ fn main() -> ExitCode {
 fn one(seed: u64, with_trace: bool) -> ExitCode {
     let outcome = sim::run(seed);
     if with_trace {
-        // Who reads it may have gone.
+        // A reader that has closed the pipe is no error.
         let _ = std::io::stdout().write_all(&outcome.trace);
     }
     println!("seed {seed}: {} frames answered", outcome.answers);

@@ -1,11 +1,11 @@
-//! What happens to replicas and the store while callers go on.
+//! The faults that happen to replicas and the store while the callers work.
 
 use crate::cluster::{Cluster, REPLICAS};
 use crate::faults::Events;
 use bagtrack_sessions::clock::sleep;
 use std::time::Duration;
 
-/// Something that happens.
+/// A fault of a replica or of the store.
 #[derive(Debug, Clone, Copy)]
 enum Event {
     Kill,
@@ -16,7 +16,7 @@ enum Event {
     ClockJump,
 }
 
-/// Lets things happen, for as long as it is polled.
+/// Lets faults happen at random times, for as long as the future is polled.
 pub async fn strike(cluster: &Cluster, events: &Events) {
     let among = choices(events);
     let chance = cluster.setup().chance.clone();
@@ -70,7 +70,7 @@ async fn kill(cluster: &Cluster, index: usize) {
     let chance = &cluster.setup().chance;
     let replica = cluster.at(index);
     match replica.filter(|_| chance.happens(0.7)) {
-        // Within some await.
+        // The replica dies at a random await point.
         Some(replica) => {
             replica.life.end_after(chance.between(1..200));
             sleep(chance.millis(10..3000)).await;
@@ -123,7 +123,7 @@ async fn store(cluster: &Cluster, event: Event) {
     setup.trace.note(format_args!("the store is there"));
 }
 
-/// Everything is as it should be from now on.
+/// Ends all faults: the store is there, and each place has a replica that lives on.
 pub async fn calm(cluster: &Cluster) {
     let setup = cluster.setup();
     setup.trace.note(format_args!("no more faults"));
@@ -133,7 +133,7 @@ pub async fn calm(cluster: &Cluster) {
         server.slow_down(Duration::ZERO);
     }
     for index in 0..REPLICAS {
-        // One that drains, or is about to die, is replaced.
+        // A replica that drains, or is about to die, is replaced.
         if cluster
             .at(index)
             .is_none_or(|replica| replica.life.is_doomed())

@@ -18,15 +18,15 @@ use std::time::Duration;
 /// The network, as one caller meets it.
 #[derive(Debug, Clone)]
 pub struct Wire {
-    /// Whose requests they are.
+    /// The caller's name, for the trace.
     pub caller: String,
     /// The replicas at its other end.
     pub cluster: Cluster,
-    /// What they answer is written here.
+    /// The journal that checks the replicas' answers.
     pub journal: Journal,
 }
 
-/// A request that can be sent several times.
+/// The copy of a request, which can be sent several times.
 #[derive(Debug, Clone)]
 struct Letter {
     method: http::Method,
@@ -35,7 +35,7 @@ struct Letter {
     body: Bytes,
 }
 
-/// The line broke before the whole answer had come.
+/// The connection broke before the whole answer had come.
 #[derive(Debug)]
 struct Broken;
 
@@ -73,7 +73,7 @@ impl Letter {
         request
     }
 
-    /// What is sent, as far as an answer depends on it.
+    /// A digest of the request's parts on which its answer depends.
     fn digest(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
         let others = self.url.query_pairs().filter(|(name, _)| name != "frame");
@@ -84,7 +84,7 @@ impl Letter {
 }
 
 impl Wire {
-    /// To which replica a request goes: the one that the address names, or any that is ready.
+    /// The index of the replica to which a request goes: the one that the address names, or any that is ready.
     fn place(&self, letter: &Letter) -> Option<usize> {
         match letter.url.host_str()?.strip_prefix("replica-") {
             Some(index) => index.parse().ok(),
@@ -157,7 +157,7 @@ impl Wire {
         }
     }
 
-    /// A proxy on the way sends a request once more.
+    /// Sends a request once more after a while, as a proxy on the way may.
     fn send_again_later(&self, letter: &Letter) {
         let (wire, letter) = (self.clone(), letter.clone());
         let chance = self.cluster.setup().chance.clone();
@@ -175,7 +175,7 @@ impl Wire {
         });
     }
 
-    /// Writes an answer down where it is one to frames, whether its caller gets it or not.
+    /// Journals an answer if it is one to frames, whether its caller gets it or not.
     fn note(&self, letter: &Letter, answer: &http::Response<Bytes>) {
         let setup = self.cluster.setup();
         let told: serde_json::Value = serde_json::from_slice(answer.body()).unwrap_or_default();
@@ -216,7 +216,7 @@ impl Wire {
     }
 }
 
-/// An answer in one line.
+/// An answer (box, score and status) in one line.
 pub(crate) fn text(answer: &serde_json::Value) -> String {
     let side = |name: &str| answer["box"][name].as_f64().unwrap_or(f64::NAN);
     let rect = [side("x"), side("y"), side("width"), side("height")].into();
@@ -249,7 +249,7 @@ impl Network for Wire {
     }
 }
 
-/// An answer that breaks before it has come.
+/// An answer whose body breaks off before its first byte.
 fn broken() -> http::Response<reqwest::Body> {
     http::Response::new(reqwest::Body::wrap(BrokenBody))
 }

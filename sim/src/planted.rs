@@ -1,9 +1,9 @@
-//! Faults that are planted in the code must be found.
+//! Tries whether the simulation finds the faults that are planted in the code.
 
 use crate::world::{Outcome, run};
 use bagtrack_sessions::{PlantedFault, plant};
 
-/// The run of the first seed that finds a fault, of so many.
+/// The first of `seeds` runs that finds this planted fault.
 pub fn finds(fault: PlantedFault, seeds: u64) -> Option<Outcome> {
     plant(Some(fault));
     let found = (0..seeds)

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 /// What a session is opened with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Opening {
-    /// Which pictures it is sent.
+    /// The clip whose pictures the session is sent.
     pub clip: usize,
     pub seed: u64,
 }
@@ -24,7 +24,7 @@ pub struct Sent {
     pub is_correction: bool,
 }
 
-/// The parameters that sessions have otherwise than the preset, to be quick.
+/// The parameters in which sessions differ from the preset, to be quick.
 const PARAMETERS: [(&str, u32); 7] = [
     ("particles", 8),
     ("patch_width", 4),
@@ -55,15 +55,15 @@ fn params(opening: Opening) -> Params {
     params
 }
 
-/// By what a session was opened with, and its frames: the answers.
+/// The answers, by what a session was opened with and its frames.
 type Known = HashMap<(Opening, Vec<Sent>), Vec<String>>;
 
 thread_local! {
-    /// The answers to sessions that were replayed before: many runs send the same frames.
+    /// The answers that were computed before: many runs send the same frames.
     static KNOWN: RefCell<Known> = RefCell::default();
 }
 
-/// The answers to the frames of a session, the first one's included.
+/// The tracker's answers to the frames of a session, including the first.
 pub fn answers(opening: Opening, frames: &[Sent]) -> Vec<String> {
     let key = (opening, frames.to_vec());
     if let Some(known) = KNOWN.with_borrow(|known| known.get(&key).cloned()) {
@@ -111,7 +111,7 @@ fn told(estimate: &Estimate) -> String {
     text(rect, score, status)
 }
 
-/// An answer in one line.
+/// An answer (box, score and status) in one line.
 pub fn text(rect: Rect, score: f64, status: &str) -> String {
     format!("{rect} {score:.3} {status}")
 }

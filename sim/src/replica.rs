@@ -1,4 +1,4 @@
-//! A replica: the real service, with its tasks, that lives until it is killed.
+//! A replica: the real service with its tasks, which run until the replica is killed.
 
 use crate::chance::Chance;
 use crate::faults::Rates;
@@ -26,19 +26,19 @@ use tower::ServiceExt;
 
 /// How long a session lives without a frame.
 pub const IDLE: Duration = Duration::from_secs(40);
-/// Longest time for connections to end.
+/// Longest time for open connections to end when a replica is drained.
 const SHUTDOWN: Duration = Duration::from_secs(2);
-/// All callers have one address.
+/// The address of all callers.
 const CLIENT: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 1);
 /// Longest time of a call to the store.
 const STORE_TIMEOUT: Duration = Duration::from_millis(800);
 
-/// What all replicas of a run have.
+/// What all replicas of a run have in common.
 #[derive(Debug, Clone)]
 pub struct Setup {
-    /// The store; without it each has its sessions for itself.
+    /// The store; without one, each replica keeps its sessions to itself.
     pub store: Option<Server>,
-    /// The state is written at every so many frames.
+    /// The state is written to the store once every so many frames.
     pub store_every: u64,
     pub workers: usize,
     pub rates: Rates,
@@ -49,11 +49,11 @@ pub struct Setup {
 /// A replica.
 #[derive(Debug, Clone)]
 pub struct Replica {
-    /// Which one, and which life of it.
+    /// "replica 1.3": the third start of the replica in place 1.
     pub name: String,
     pub life: Life,
     pub service: Service,
-    /// What its sessions expire by.
+    /// The clock by which its sessions expire.
     pub clock: Clock,
     router: Router,
     connections: Arc<Lines>,
@@ -64,9 +64,9 @@ pub struct Replica {
 struct Lines {
     service: ConnectionService,
     open: Arc<Connections>,
-    /// Told when they are to end.
+    /// Set to true when the connections are to end.
     ending: watch::Sender<bool>,
-    /// Never dropped before the replica.
+    /// Dropping this sender would cut the connections off: it lives as long as the replica.
     keep_alive: watch::Sender<()>,
 }
 
@@ -74,7 +74,7 @@ thread_local! {
     static BEGIN: Cell<Option<Instant>> = const { Cell::new(None) };
 }
 
-/// The time of day at the beginning of a run is always the same.
+/// Begins the simulated time of day of this thread's run, which is the same in all runs.
 pub fn set_time_of_day() {
     BEGIN.set(Some(now()));
 }
@@ -155,8 +155,8 @@ impl Replica {
         let _ = timeout(SHUTDOWN, self.connections.ending.closed()).await;
     }
 
-    /// The answer to a request, with its whole body; none where the replica dies before. The request goes on when this
-    /// is dropped, unless `abort` is.
+    /// The answer to a request, with its whole body; none if the replica dies first. Dropping the returned
+    /// [`AbortOnDrop`] aborts the request; dropping the receiver does not.
     pub fn answer(
         &self,
         request: Request<Body>,
@@ -174,12 +174,12 @@ impl Replica {
     }
 }
 
-/// Ends a request when its client has gone.
+/// Aborts a request when its client has gone, unless detached.
 #[derive(Debug)]
 pub struct AbortOnDrop(Option<tokio::task::AbortHandle>);
 
 impl AbortOnDrop {
-    /// The request goes on without its client, as behind a proxy that does not tell.
+    /// The request goes on without its client, as behind a proxy that does not report that the client has gone.
     pub fn detach(mut self) {
         self.0 = None;
     }
@@ -213,7 +213,7 @@ async fn store(
     Arc::new(store.expect("the address can be used"))
 }
 
-/// Does the work of a replica after some time, on the thread of the simulation.
+/// Does a replica's work on the thread of the simulation, after a simulated time that stands for the work's.
 fn executor(setup: &Setup, life: &Life) -> Executor {
     let (chance, life) = (setup.chance.clone(), life.clone());
     Executor::on_one_thread(move |work| {

@@ -12,7 +12,7 @@ const WIDTH: u32 = 64;
 const HEIGHT: u32 = 48;
 const SIDE: u32 = 12;
 
-/// A picture as it is sent. After the last one the first comes again.
+/// A picture of a clip, as PNG. After the last picture of the clip the first comes again.
 pub fn picture(clip: usize, index: usize) -> Bytes {
     static PICTURES_OF: OnceLock<Vec<Vec<Bytes>>> = OnceLock::new();
     let clips = PICTURES_OF.get_or_init(|| {

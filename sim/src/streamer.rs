@@ -1,6 +1,6 @@
-//! A caller that sends frames over a stream, as a camera does: where the line breaks it opens another stream, takes the
-//! stored answers, and goes on with a new picture. Its frames have no numbers, so none may come from an old stream once
-//! the new one has told where the session stands.
+//! A caller that sends frames over streams, as a camera does. Where the connection breaks it opens another stream,
+//! takes the stored answers, and goes on with a new picture. Its frames have no numbers, so the service must track no
+//! frame of an old stream once the new stream has told the session's next frame.
 
 use crate::caller::{Account, Caller, Ended, TIMEOUT, rect};
 use crate::journal::Given;
@@ -16,16 +16,16 @@ use tokio::io::DuplexStream;
 use tokio_tungstenite::tungstenite::{Error, Message};
 use tokio_tungstenite::{WebSocketStream, client_async};
 
-/// How long a stream is tried to be opened.
+/// How long opening a stream is tried.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 type Socket = WebSocketStream<DuplexStream>;
 
-/// Why a stream is left.
+/// Why the caller leaves a stream.
 enum Left {
-    /// For another one.
+    /// The stream broke; another one may go on with the session.
     Broken,
-    /// With its session.
+    /// The service no longer has the session.
     Gone(String),
 }
 
@@ -33,7 +33,7 @@ impl Caller {
     /// Sends frames over some streams, one after the other, and ends the session.
     pub(crate) async fn stream(&self, session: Session, mut account: Account) {
         let (id, mut ended) = (session.id().to_string(), Ok(()));
-        // A phone that comes into another network tells nobody: its old connections stay.
+        // The old sockets that are kept open: a phone that changes its network does not close its connections.
         let mut left = Vec::new();
         for _ in 0..self.chance.between(1..6) {
             match self.one_stream(&id, &mut account).await {
@@ -46,7 +46,7 @@ impl Caller {
         }
         account.choose();
         if ended.is_ok() {
-            // What is on its way when the session ends has no answer.
+            // Frames that are on their way when the session ends get no answer.
             account.unanswered.clear();
             ended = match session.end().await {
                 Ok(()) => Ok(()),
@@ -56,7 +56,8 @@ impl Caller {
         self.finish(account, ended.err());
     }
 
-    /// The stream is left with some frames on their way, or where its line breaks.
+    /// Opens a stream and exchanges frames over it; leaves it with some frames on their way, or when it breaks. Returns
+    /// the socket, if the stream was opened.
     async fn one_stream(
         &self,
         session: &str,
@@ -72,7 +73,7 @@ impl Caller {
             match self.exchange(session, &mut socket, account).await {
                 Ok(()) => {}
                 Err(Left::Broken) => {
-                    // One whose caller does not read for long is taken for silent.
+                    // The service closes a stream whose caller has been silent for long: that is no fault.
                     if self.is_quiet() && account.touched.elapsed() < TIMEOUT {
                         self.fault("a stream breaks while all is well");
                     }
@@ -138,8 +139,8 @@ impl Caller {
         }
     }
 
-    /// Opens a stream, and takes the answers to frames that a stream before it sent. None where that cannot be had for
-    /// some time.
+    /// Opens a stream, and takes the stored answers to frames that an earlier stream sent. `None` if no stream could be
+    /// opened within [`PATIENCE`] while there are faults.
     async fn open_stream(
         &self,
         session: &str,
@@ -183,8 +184,8 @@ impl Caller {
         }
     }
 
-    /// The service tells where the session stands, and the answers to frames whose answers did not come. Those which it
-    /// does not tell it has not tracked, and never will.
+    /// Reads the service's greeting: the number of the next frame, then the stored answers that the caller lacks.
+    /// Frames of an earlier stream that are not among them were not tracked, and never will be.
     async fn take_up(
         &self,
         session: &str,
@@ -212,7 +213,7 @@ impl Caller {
         Ok(socket)
     }
 
-    /// A frame has this answer.
+    /// Checks and journals the answer to a frame.
     fn answered(&self, session: &str, account: &mut Account, frame: usize, answer: &Value) {
         let told = answer["frame"].as_u64();
         if told != Some(frame as u64) {
@@ -239,13 +240,14 @@ impl Account {
         self.others.iter_mut().for_each(|sent| sent.push(frame));
     }
 
-    /// As many of the frames without an answer were tracked, and have these answers. Two pictures may have the same
-    /// one, so several choices may have them. Whether there is any.
+    /// Finds which of the unanswered frames were tracked: as many as there are answers, and such that the tracker gives
+    /// these answers. Several choices may fit, because two pictures may have the same answer; all are kept. False if
+    /// none fits.
     fn take(&mut self, answers: &[String]) -> bool {
         let unanswered = std::mem::take(&mut self.unanswered);
         let others = std::mem::take(&mut self.others);
         let before = std::iter::once(&self.sent).chain(&others);
-        // They are few: those of one stream.
+        // All subsets of the unanswered frames of one stream; there are few frames.
         let choices: Vec<Vec<Sent>> = (0..1_u32 << unanswered.len())
             .filter(|chosen| chosen.count_ones() as usize == answers.len())
             .map(|chosen| {
@@ -271,7 +273,7 @@ impl Account {
         true
     }
 
-    /// Of what may have been sent, takes what has all answers that came.
+    /// Sets `sent` to the possible sequence of frames that fits all answers, if one of `others` does.
     fn choose(&mut self) {
         let has_all = |sent: &Vec<Sent>| {
             let expected = replay::answers(self.opening, sent);
@@ -302,7 +304,7 @@ async fn message(socket: &mut Socket, patience: Duration) -> Result<Value, Left>
     }
 }
 
-/// What a problem document means.
+/// What a problem document in place of an answer means for the stream.
 fn refusal(problem: &Value) -> Left {
     match problem["status"].as_u64() {
         Some(404 | 410) => Left::Gone(problem.to_string()),

@@ -13,7 +13,7 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// None so far; their times are those since now.
+    /// An empty trace, whose lines will have their times since now.
     pub fn begin() -> Self {
         Self {
             begin: now(),

@@ -1,4 +1,4 @@
-//! One run: it builds the world of a seed, lets it go on, and checks what has come of it.
+//! One run: draws replicas, callers and faults from a seed, lets the callers work, and checks the result.
 
 use crate::caller::Caller;
 use crate::chance::Chance;
@@ -17,15 +17,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// After this time of the simulation all callers have ended.
+/// Longest simulated time that a run waits for a caller after the faults have ended.
 const LONGEST: Duration = Duration::from_secs(900);
 
-/// What has come of a run.
+/// The result of a run.
 #[derive(Debug)]
 pub struct Outcome {
-    /// The seed that it followed from.
+    /// The seed of the run.
     pub seed: u64,
-    /// What contradicts the promises.
+    /// The broken promises, in words; none where the run is good.
     pub faults: Vec<String>,
     /// What happened, line by line.
     pub trace: Vec<u8>,
@@ -67,7 +67,7 @@ async fn live(seed: u64) -> Outcome {
     let time = chance.millis(2000..30_000);
     let _ = timeout(time, nemesis::strike(&cluster, &events)).await;
     nemesis::calm(&cluster).await;
-    // What was sent before may still break.
+    // Messages that were sent before may still be lost or late.
     sleep(Duration::from_secs(10)).await;
     is_quiet.store(true, Ordering::Relaxed);
     for (name, caller) in callers {
@@ -107,7 +107,8 @@ fn callers(
             let addresses: Vec<String> = places
                 .map(|place| format!("http://replica-{place}"))
                 .collect();
-            // Without a store, or with one that does not have each state, a session has to stay at its replica.
+            // Without a store, or with one that does not get the state of each frame, a session has to stay at its
+            // replica.
             let is_balanced = balanced && setup.store.is_some() && setup.store_every == 1;
             let wire = Wire {
                 caller: name.clone(),
@@ -116,7 +117,7 @@ fn callers(
             };
             let every = *chance.one_of(&[1, 3, 30]);
             let addresses = if is_balanced { &any } else { &addresses };
-            // Of a stream without numbers each frame has to be in the store.
+            // The frames of a stream have no numbers, so they cannot be sent again: the store has to have each state.
             let streams = match setup.store.is_some() && setup.store_every == 1 {
                 true => 0.4,
                 false => 0.0,
@@ -138,7 +139,7 @@ fn callers(
         .collect()
 }
 
-/// Makes requests, and sends none. It is the same for all runs of a thread.
+/// The client builds its requests with this, and sends none by it. All runs of a thread share it.
 fn http() -> reqwest::Client {
     thread_local! {
         static HTTP: reqwest::Client = reqwest::Client::new();

@@ -10,6 +10,6 @@ fn each_planted_fault_is_found() {
         let found = sim::finds(fault, 200);
         assert!(found.is_some(), "{fault:?}");
     }
-    // It was they that were found.
+    // Without a planted fault there is nothing to find.
     assert!(sim::run(0).faults.is_empty());
 }

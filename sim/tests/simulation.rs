@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-/// What another process writes of a seed.
+/// The output of `sim --trace` for this seed, run in another process.
 fn trace_of_another_process(seed: u64) -> Vec<u8> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_sim"));
     command.args(["--seed", &seed.to_string(), "--trace"]);

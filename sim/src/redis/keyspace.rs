@@ -1,11 +1,11 @@
-//! The keys, and the commands that the scripts of the store use.
+//! The keys of the simulated Redis, and the commands that the store's scripts call.
 
 use bagtrack_sessions::NewHash;
 use std::collections::BTreeMap;
 
 type Bytes = Vec<u8>;
 
-/// What a command answers.
+/// The reply to a command.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Reply {
     Nil,
@@ -17,9 +17,9 @@ pub enum Reply {
 /// All keys with their values.
 #[derive(Debug, Clone, Default)]
 pub struct Keyspace {
-    /// Milliseconds since some moment.
+    /// The time in milliseconds since the start of the server; the caller sets it before each command.
     pub now: u64,
-    /// Bytes of the bound of memory and of what is used, as `INFO memory` tells them.
+    /// `maxmemory` and `used_memory` in bytes, as `INFO memory` tells them.
     pub memory: (u64, u64),
     entries: BTreeMap<Bytes, Entry>,
 }
@@ -40,10 +40,10 @@ enum Value {
 const WRONG_TYPE: &str = "WRONGTYPE Operation against a key holding the wrong kind of value";
 
 impl Keyspace {
-    /// Does a command.
+    /// Runs a command, given as its words.
     ///
     /// # Errors
-    /// What a Redis says to it.
+    /// The error that a Redis would give.
     pub fn call(&mut self, words: &[Bytes]) -> Result<Reply, String> {
         let (name, args) = words.split_first().ok_or("ERR no command")?;
         match (&name[..], args) {
@@ -79,7 +79,7 @@ impl Keyspace {
     /// Makes a hash with one field.
     ///
     /// # Errors
-    /// What a Redis says to that.
+    /// The error that a Redis would give.
     pub fn make_hash(&mut self, new: &NewHash) -> Result<(), String> {
         let key = new.key.as_bytes();
         self.set_fields(key, &[new.field.as_bytes().to_vec(), new.value.to_vec()])?;

@@ -1,4 +1,4 @@
-//! A replica's line to the server, over a network with faults.
+//! A replica's connection to the Redis server, over a network with faults.
 
 use super::server::{Server, broken};
 use crate::chance::Chance;
@@ -11,14 +11,14 @@ use redis::{RedisFuture, RedisResult, Value};
 use std::future::pending;
 use std::time::Duration;
 
-/// The line of one replica.
+/// The connection of one replica.
 #[derive(Debug, Clone)]
 pub struct Line {
-    /// Of which replica it is.
+    /// The replica's name, for the trace.
     pub name: String,
     /// The server at its other end.
     pub server: Server,
-    /// The replica. Of one that is dead nothing comes.
+    /// The replica's life. A dead replica sends nothing.
     pub life: Life,
     pub rates: Rates,
     pub chance: Chance,
@@ -33,7 +33,7 @@ impl Line {
         }
     }
 
-    /// A message is lost: the line breaks, or nothing more comes over it.
+    /// Loses a message: the caller sees a broken line, or waits for ever.
     async fn lose(&self, what: &str) -> RedisResult<Value> {
         self.trace
             .note(format_args!("{} store: {what} lost", self.name));
@@ -82,7 +82,7 @@ impl Line {
         }
     }
 
-    /// The message was in a buffer of a line that was given up, and comes once more.
+    /// Delivers the message once more after a while, as a buffer of an abandoned connection may.
     fn repeat_later(&self, message: &Message<'_>) {
         let (line, delay) = (self.clone(), self.chance.millis(1..2500));
         let new = message.new.cloned();
@@ -108,7 +108,7 @@ impl Line {
     }
 }
 
-/// What the line carries to the server.
+/// A call of a script, on its way to the server.
 struct Message<'a> {
     new: Option<&'a NewHash>,
     script: &'a str,
@@ -139,7 +139,7 @@ impl ScriptServer for Line {
     }
 }
 
-/// The first number of an answer, which tells its kind.
+/// The first number of an answer, which tells its kind, for the trace.
 fn summary(answer: &Value) -> String {
     match answer {
         Value::Array(parts) => parts.first().map_or_else(String::new, summary),

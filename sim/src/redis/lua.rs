@@ -1,4 +1,4 @@
-//! Runs the scripts of the store, as Redis does: each as a whole, with Lua 5.1.
+//! Runs the scripts of the store as Redis does: each without interruption, in Lua 5.1.
 
 use super::keyspace::{Keyspace, Reply};
 use mlua::{Function, Lua, Table, Value, Variadic};
@@ -6,9 +6,9 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 
 thread_local! {
-    /// One for all runs: what they run on is lent to it.
+    /// One Lua engine for all runs of a thread; each call lends it its keyspace.
     static ENGINE: Engine = Engine::new().expect("Lua starts");
-    /// The keys, while a script runs on them.
+    /// The keyspace on which a script runs; empty between scripts.
     static LENT: RefCell<Keyspace> = RefCell::default();
 }
 
@@ -17,10 +17,10 @@ struct Engine {
     scripts: RefCell<HashMap<String, Function>>,
 }
 
-/// Runs a script on these keys.
+/// Runs a script on this keyspace.
 ///
 /// # Errors
-/// That of the script. What it has done until then stays.
+/// The error of the script. Its writes before the error stay, as in Redis.
 pub fn run(
     keyspace: &mut Keyspace,
     script: &str,
@@ -81,7 +81,7 @@ fn word(value: &Value) -> mlua::Result<Vec<u8>> {
     }
 }
 
-/// What a command answers, as Redis hands it to Lua: nothing is `false`.
+/// A command's reply as a Lua value, converted as Redis does: nil becomes `false`.
 fn to_lua(lua: &Lua, reply: Reply) -> mlua::Result<Value> {
     Ok(match reply {
         Reply::Nil => Value::Boolean(false),
@@ -95,7 +95,8 @@ fn to_lua(lua: &Lua, reply: Reply) -> mlua::Result<Value> {
     })
 }
 
-/// What a script answers, as Redis hands it to its client: a list ends at its first `nil`, numbers lose their fraction.
+/// A script's result as the client gets it, converted as Redis does: a list ends at its first `nil`, numbers lose their
+/// fraction.
 fn from_lua(value: Value) -> mlua::Result<redis::Value> {
     Ok(match value {
         Value::Boolean(true) => redis::Value::Int(1),

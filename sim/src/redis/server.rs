@@ -1,4 +1,4 @@
-//! The server: its keys, whether it is there, and how fast.
+//! The simulated Redis server: its keys, whether it is reachable, and how slow it is.
 
 use super::keyspace::Keyspace;
 use super::lua;
@@ -9,10 +9,10 @@ use redis::{ErrorKind, RedisError, RedisResult, Value};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// What the heads of records begin with (docs/RELIABILITY.md): replicas of other versions go by it.
+/// The first byte of each record's head (docs/RELIABILITY.md), by which replicas of other versions know the format.
 const HEAD_FORMAT: u8 = 2;
 
-/// The server. Clones are the same.
+/// The server. Clones share its keys.
 #[derive(Debug, Clone)]
 pub struct Server {
     begin: Instant,
@@ -25,12 +25,12 @@ struct Shared {
     keyspace: Keyspace,
     is_away: bool,
     slow_by: Duration,
-    /// Counts the restarts: lines of before are broken.
+    /// Counts the restarts: connections from before a restart are broken.
     epoch: u64,
 }
 
 impl Server {
-    /// A server without keys, which tells this journal what is written.
+    /// A server without keys, which tells `journal` which frames and checkpoints are written.
     pub fn new(journal: Journal) -> Self {
         Self {
             begin: now(),
@@ -39,7 +39,8 @@ impl Server {
         }
     }
 
-    /// Makes a hash and runs a script, and journals what its session has then.
+    /// Makes the hash `new`, if given, runs a script, and journals the frame and the checkpoint of its session's
+    /// record.
     ///
     /// # Errors
     /// The server is away, or refuses the script.
@@ -76,25 +77,25 @@ impl Server {
         answer.map_err(refusal)
     }
 
-    /// Whether it answers now, and how slowly; and how often it was restarted.
+    /// Whether the server is reachable, how much longer its answers take, and how often it was restarted.
     pub fn state(&self) -> (bool, Duration, u64) {
         let shared = self.lock();
         (!shared.is_away, shared.slow_by, shared.epoch)
     }
 
-    /// It goes, with all lines to it.
+    /// Makes the server unreachable, and breaks all connections to it.
     pub fn leave(&self) {
         let mut shared = self.lock();
         shared.is_away = true;
         shared.epoch += 1;
     }
 
-    /// It is back, with the keys that it had.
+    /// Makes the server reachable again, with the keys that it had.
     pub fn come_back(&self) {
         self.lock().is_away = false;
     }
 
-    /// Each answer takes so much longer.
+    /// From now on each answer takes longer by this time.
     pub fn slow_down(&self, by: Duration) {
         self.lock().slow_by = by;
     }
@@ -119,13 +120,13 @@ fn refusal(error: String) -> RedisError {
     RedisError::from((ErrorKind::Extension, "a script failed", error))
 }
 
-/// The session whose record has this key.
+/// The id of the session whose record has this key.
 pub fn session_of(key: &str) -> Option<&str> {
     let (_, rest) = key.split_once(":session:{")?;
     rest.strip_suffix('}')
 }
 
-/// The line to the server broke.
+/// The error of a broken connection to the server.
 pub fn broken() -> RedisError {
     RedisError::from((ErrorKind::Io, "the line broke"))
 }
