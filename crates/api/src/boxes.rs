@@ -57,7 +57,7 @@ impl FromStr for Boxes {
     }
 }
 
-/// `x,y,width,height;x,y,width,height`, as queries have it.
+/// `x,y,width,height;x,y,width,height`, as in queries.
 impl fmt::Display for Boxes {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let texts: Vec<String> = self.0.iter().map(Rect::to_string).collect();

@@ -1,12 +1,12 @@
-//! What the bagtrack service takes and answers, as types: what the service and its clients agree on.
+//! The types of the bagtrack service's requests and answers, which the service and its clients share.
 //!
-//! A [`Rect`] is a target's box, an [`Answer`] is what a frame gets, a [`CreatedSession`] is what opening one gets. A
-//! [`ProblemDocument`] is what is said where anything fails; its [`ProblemKind`] comes from one catalogue. All of them
-//! are read and written as JSON, by serde. `requests` (with the feature `service`) has the settings of each call, as
-//! the service reads them, and `openapi` the document that says so.
+//! A [`Rect`] is a target's box, an [`Answer`] the answer to a frame, a [`CreatedSession`] the answer to a request that
+//! opens a session. A [`ProblemDocument`] tells of any failure; its [`ProblemKind`] comes from one catalogue. All are
+//! read and written as JSON, by serde. With the feature `service`, `requests` has the settings of each call, as the
+//! service reads them, and `openapi` the document that describes them.
 //!
-//! What can go wrong: a member that the service adds is unknown to an older client. So answers are read without looking
-//! at what is not known; requests with an unknown setting are refused.
+//! What can go wrong: a member that the service adds is unknown to an older client. So clients ignore unknown members
+//! of answers; the service refuses requests with an unknown setting.
 
 pub mod answer;
 mod boxes;
@@ -32,7 +32,7 @@ pub use stream::{FrameHeader, Hello, Particles, StreamAnswer};
 
 /// The media types of what is sent.
 pub mod media_types {
-    /// A frame, of whatever format: its bytes tell that.
+    /// A frame; its first bytes tell its format.
     pub const FRAME: &str = "application/octet-stream";
     /// A snapshot of a session.
     pub const SNAPSHOT: &str = "application/vnd.bagtrack.snapshot";
@@ -44,11 +44,11 @@ pub mod media_types {
 
 /// The header fields that are the service's own, in lower case.
 pub mod headers {
-    /// `true` where an answer was given before.
+    /// `true` if this is the stored answer to a request that was sent again.
     pub const REPLAYED: &str = "replayed";
-    /// The last frame whose state is in the store.
+    /// The number of the last frame whose state is in the store.
     pub const CHECKPOINT: &str = "checkpoint";
-    /// `true` where the service is about to end.
+    /// `true` if the service is about to end.
     pub const DRAINING: &str = "draining";
     /// With a picture: the answer as JSON.
     pub const ANSWER: &str = "answer";

@@ -1,4 +1,4 @@
-//! The tracker's parameters: a preset, and single ones that are set otherwise.
+//! The tracker's parameters in a request: a preset, and single parameters that differ from it.
 
 use serde::de::{Deserialize, Deserializer, Error};
 use serde_json::{Map, Value};
@@ -14,7 +14,7 @@ pub enum PresetName {
     Robust,
 }
 
-/// Single parameters by their names. They are read from an object, or from its text.
+/// Single parameters by their names. Read from a JSON object, or from a string with the text of one.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 #[serde(transparent)]
 pub struct Parameters(pub Map<String, Value>);

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
 /// A problem document (RFC 9457).
-// A client that reads a proxy's error page makes one with the status alone.
+// Most members have defaults: of a proxy's error page, a client makes a document with the status alone.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, thiserror::Error)]
 #[error("{} ({status})", if detail.is_empty() { title } else { detail })]
 #[cfg_attr(feature = "service", derive(utoipa::ToSchema), schema(as = Problem))]

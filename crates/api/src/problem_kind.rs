@@ -1,10 +1,10 @@
 //! The catalogue of problem kinds: each has a status, a name and a title that never change, its usual causes and their
 //! cure. The answers, the OpenAPI document and the page `/docs/problems` are made from it.
 
-/// The page that tells of all kinds, below the service's base path.
+/// The path of the page that describes all kinds, below the service's base path.
 pub const PROBLEMS_PAGE: &str = "/docs/problems";
 
-/// What the catalogue says of a kind.
+/// A kind's entry in the catalogue.
 struct Entry {
     status: u16,
     slug: &'static str,
@@ -13,7 +13,7 @@ struct Entry {
     cure: &'static str,
 }
 
-/// Makes [`ProblemKind`] and its entries from one list, so that none lacks anything.
+/// Makes [`ProblemKind`] and the catalogue from one list, so that every kind has a complete entry.
 macro_rules! kinds {
     ($($name:ident: $status:literal $slug:literal $title:literal cause: $cause:literal cure: $cure:literal)*) => {
         /// A kind of problem: one problem type of the interface.
@@ -23,7 +23,7 @@ macro_rules! kinds {
         }
 
         impl ProblemKind {
-            /// All kinds, by their statuses.
+            /// All kinds, in the order of their statuses.
             pub const ALL: &'static [Self] = &[$(Self::$name,)*];
 
             fn entry(self) -> Entry {
@@ -172,27 +172,27 @@ kinds! {
 }
 
 impl ProblemKind {
-    /// Its name: the last part of the problem type.
+    /// The kind's name: the last part of the problem type.
     pub fn slug(self) -> &'static str {
         self.entry().slug
     }
 
-    /// The problem type: the address of its section of the page, of a service below this path.
+    /// The problem type: the address of the kind's section of the problems page, for a service below `base_path`.
     pub fn uri(self, base_path: &str) -> String {
         format!("{base_path}{PROBLEMS_PAGE}#{}", self.slug())
     }
 
-    /// The status code that it is answered with.
+    /// The status code of the response.
     pub fn status(self) -> u16 {
         self.entry().status
     }
 
-    /// What it is, in a few words; the same for every occurrence.
+    /// The title: the kind in a few words, the same for every occurrence.
     pub fn title(self) -> &'static str {
         self.entry().title
     }
 
-    /// Why it happens, with code in backticks.
+    /// The usual causes, with code in backticks.
     pub fn cause(self) -> &'static str {
         self.entry().cause
     }
@@ -202,7 +202,7 @@ impl ProblemKind {
         self.entry().cure
     }
 
-    /// Seconds after which trying again makes sense, where it does.
+    /// Seconds after which trying again makes sense; `None` where it does not.
     pub fn retry_after(self) -> Option<u32> {
         match self {
             Self::SessionBusy

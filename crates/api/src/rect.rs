@@ -29,7 +29,7 @@ pub struct Rect {
 }
 
 impl Rect {
-    /// To a hundredth of a pixel, as boxes are answered. No digit after that means anything.
+    /// Rounded to a hundredth of a pixel, as in answers; further digits mean nothing.
     pub fn rounded(self) -> Self {
         // A negative zero becomes a positive one.
         let round = |value: f64| (value * 100.0).round() / 100.0 + 0.0;
@@ -54,7 +54,7 @@ impl From<[f64; 4]> for Rect {
     }
 }
 
-/// `x,y,width,height`, as queries have it: all digits of the numbers.
+/// `x,y,width,height`, as in queries, with all digits of the numbers.
 impl fmt::Display for Rect {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{},{},{},{}", self.x, self.y, self.width, self.height)

@@ -1,4 +1,4 @@
-//! What is said of sessions, and of the service itself.
+//! The answers about sessions, and about the service itself.
 
 use super::answer::{Answer, ImageSize};
 use super::parameters::Parameters;

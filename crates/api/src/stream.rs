@@ -1,26 +1,26 @@
-//! The text messages of a stream, and the lines of an answer by lines.
+//! The text messages of a stream, and the lines of an answer in JSON lines.
 
 use super::answer::Answer;
 use super::rect::Rect;
 use serde::{Deserialize, Serialize};
 
-/// What a client says of the frame that comes next.
+/// A client's text message about the frame that it sends next.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FrameHeader {
-    /// Its number.
+    /// The number of that frame.
     pub frame: Option<u64>,
-    /// The box in it, where the user corrects it.
+    /// The corrected box of the target in that frame, if the user gives one.
     #[serde(rename = "box")]
     pub rect: Option<Rect>,
-    /// Which target is corrected, or is told about, counted from 0.
+    /// The target that `rect` corrects or `see` asks about, counted from 0.
     pub target: Option<usize>,
-    /// Whether the answer shall tell what the tracker saw.
+    /// Whether the answer shall have the target's [`Particles`].
     pub see: bool,
 }
 
 impl FrameHeader {
-    /// What this and a later text say of one frame. None, where they are about two targets.
+    /// Merges this text with a later one about the same frame. `None` if they are about different targets.
     pub fn and(self, later: Self) -> Option<Self> {
         let is_of_target = |header: &Self| header.rect.is_some() || header.see;
         let target = |header: &Self| header.target.unwrap_or(0);
@@ -35,7 +35,7 @@ impl FrameHeader {
     }
 }
 
-/// The first message of the service.
+/// The first message of the service in a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Hello {
     /// The number of the next frame.
@@ -48,24 +48,24 @@ pub struct StreamAnswer {
     /// The answer.
     #[serde(flatten)]
     pub answer: Answer,
-    /// Frames before it that were skipped, with `drop=true`.
+    /// How many frames right before this one were skipped, with `drop=true`.
     #[serde(default, skip_serializing_if = "is_default")]
     pub skipped: u64,
-    /// Whether it was given before.
+    /// Whether the frame was tracked before: this is its stored answer.
     #[serde(default, skip_serializing_if = "is_default")]
     pub replayed: bool,
-    /// With a store: the last frame whose state is in it.
+    /// With a store: the number of the last frame whose state is in the store.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checkpoint: Option<u64>,
     /// Whether the service is about to end.
     #[serde(default, skip_serializing_if = "is_default")]
     pub draining: bool,
-    /// What the tracker saw, where that was asked for.
+    /// The particles of the tracker, where the client asked for them.
     #[serde(flatten)]
     pub seen: Option<Particles>,
 }
 
-/// What the tracker saw in a frame.
+/// A tracker's likeliest particles in a frame, and the votes of its bag.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Particles {
     /// For the likeliest particles, likeliest first: centre (x, y), width, and weight.

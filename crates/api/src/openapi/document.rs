@@ -1,4 +1,4 @@
-//! The document as it is sent: what the handlers say, and what follows from all of them together.
+//! Completes the OpenAPI document: handlers describe their own calls, and this adds what many calls have in common.
 
 use super::key_order::InOrder;
 use super::params_schema;
@@ -7,16 +7,16 @@ use crate::requests::MAX_EXACT;
 use serde_json::{Map, Value, json};
 use utoipa::openapi::OpenApi;
 
-/// The id in all examples: that of `putSession` opens the session which the others use.
+/// The session id of all examples: the example of `putSession` opens the session that the other examples use.
 const EXAMPLE_ID: &str = "67e55044-10b1-426f-9247-bb680e5fe0c8";
 /// The calls that open a session.
 const OPENING: [&str; 2] = ["createSession", "putSession"];
-/// The calls that are answered without looking at who asks.
+/// The calls that count against no client's quotas.
 const WITHOUT_CLIENT: [&str; 4] = ["getVersion", "getHealth", "getReadiness", "getMetrics"];
-/// A handshake cannot be made by following a link.
+/// The WebSocket handshake, which no client can make by following a link.
 const HANDSHAKE: &str = "openStream";
 
-/// The OpenAPI document as JSON: what `handlers` say, of a service at this path.
+/// The OpenAPI document as JSON: the calls of `handlers`, for a service below `base_path`.
 pub fn document(handlers: &OpenApi, base_path: &str) -> String {
     let document = serde_json::to_value(handlers);
     let mut document = document.expect("the document is plain JSON");
@@ -41,7 +41,7 @@ pub fn document(handlers: &OpenApi, base_path: &str) -> String {
     serde_json::to_string_pretty(&InOrder(&document)).expect("the document is plain JSON")
 }
 
-/// `putSession` takes and answers what `createSession` does.
+/// Copies the body and the responses of `createSession` to `putSession`, which has the same.
 fn share_opening(document: &mut Value) {
     let create = &document["paths"]["/sessions"]["post"];
     let shared = ["requestBody", "responses"].map(|member| (member, create[member].clone()));
@@ -50,7 +50,7 @@ fn share_opening(document: &mut Value) {
     }
 }
 
-/// Whole numbers of 64 bits are no greater than JSON holds exactly in every language.
+/// Bounds 64-bit integers by the greatest number that JSON holds exactly in every language.
 fn bound_integers(value: &mut Value) {
     match value {
         Value::Object(object) => {
@@ -73,7 +73,7 @@ fn operations(document: &mut Value) -> impl Iterator<Item = &mut Value> {
         .flat_map(Map::values_mut)
 }
 
-/// The id of a session gets an example. A switch in the query needs no value.
+/// Gives session ids an example, and allows switches in the query without a value.
 fn complete_parameters(operation: &mut Value) {
     let parameters = operation.get_mut("parameters");
     let parameters = parameters.and_then(Value::as_array_mut);
@@ -87,7 +87,7 @@ fn complete_parameters(operation: &mut Value) {
     }
 }
 
-/// The problems that the operation may answer, beside its responses.
+/// Adds the problems that the operation may answer to its responses.
 fn add_problems(operation: &mut Value) {
     let id = operation["operationId"].as_str().unwrap_or_default();
     let problems = problem_responses(id);
@@ -96,7 +96,8 @@ fn add_problems(operation: &mut Value) {
     }
 }
 
-/// Answers tell the client's quotas, and refusals for one of them (429).
+/// Adds the headers with the client's quotas to successful answers, and to `4XX`, which has the refusals for a quota
+/// (429).
 fn add_rate_limits(operation: &mut Value) {
     let header = |text: &str| json!({"description": text, "schema": {"type": "string"}});
     let responses = operation["responses"].as_object_mut();
@@ -109,7 +110,7 @@ fn add_rate_limits(operation: &mut Value) {
     }
 }
 
-/// From a new session to all calls on it.
+/// Links from the answer that opens a session to all calls on that session.
 fn links(document: &Value) -> Value {
     let paths = document["paths"].as_object().expect("a document has paths");
     let on_session = paths

@@ -8,7 +8,7 @@ pub fn first() -> String {
     STANDARD.encode(include_bytes!("first.jpg"))
 }
 
-/// A frame after it as base64.
+/// A later frame as base64.
 pub fn next() -> String {
     STANDARD.encode(include_bytes!("next.jpg"))
 }

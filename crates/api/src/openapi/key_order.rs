@@ -1,11 +1,12 @@
-//! Writes JSON with the members of objects in a chosen order: some readers of OpenAPI documents take the first.
+//! Writes JSON with the members of objects in a chosen order: some readers of OpenAPI documents use only the first of
+//! several.
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::Value;
 
-/// Members that stand before all others, in this order. Calls stand in the order in which they are used. Generators of
-/// clients make their call from the first media type of a body, and Swagger UI shows it: the raw file before the forms,
-/// and those before base64. Of an answer they take the first, too, and JSON is wanted before a picture.
+/// The members that come before all others, in this order. Paths are in the order of use. Client generators and Swagger
+/// UI use the first media type of a body or an answer: so a raw file comes before a form, a form before base64 in JSON,
+/// and JSON before a picture.
 const FIRST: &[&str] = &[
     "openapi",
     "info",
@@ -44,7 +45,7 @@ const FIRST: &[&str] = &[
     "in",
 ];
 
-/// JSON to be written in order.
+/// A JSON value that is serialised with its members in the order of `FIRST`.
 pub struct InOrder<'a>(pub &'a Value);
 
 impl Serialize for InOrder<'_> {
@@ -52,7 +53,7 @@ impl Serialize for InOrder<'_> {
         match self.0 {
             Value::Object(object) => {
                 let mut members: Vec<_> = object.iter().collect();
-                // The sort is stable: the others stay as they were.
+                // The sort is stable: all other members keep their order.
                 members.sort_by_key(|(name, _)| {
                     FIRST
                         .iter()

@@ -1,5 +1,5 @@
-//! The schema of the tracker's parameters, made here and nowhere else, from the tracker's table; and what the document
-//! says of the limits on products of sizes: the words of the errors with which they are refused.
+//! The schema of the tracker's parameters, from the tracker's table; and the description of the limits on products of
+//! sizes, in the words of the tracker's errors.
 
 use crate::requests::{MAX_EXACT, number_schema, public_params};
 use bagtrack_tracker::{Features, Parameter, Params, Preset};
@@ -12,7 +12,7 @@ use utoipa::openapi::schema::{
 /// An object with a property for each parameter.
 pub(super) fn parameters() -> Object {
     let mut defaults = public_params(&Preset::default().params()).0;
-    // Without one, a session draws its own.
+    // No default: without a seed, a session draws one.
     defaults.remove("seed");
     let object = Params::TABLE.iter().fold(
         ObjectBuilder::new()
@@ -27,7 +27,7 @@ pub(super) fn parameters() -> Object {
     object.build()
 }
 
-/// A row of the table, with the value that the parameter has when it is left out.
+/// The schema of the parameter in a row of the table; `default` is its value when it is left out.
 fn param(row: &Parameter, default: Option<Value>) -> Schema {
     // The bounds of whole numbers are whole in the table.
     let whole = |bound| Number::Int(bound as isize);
@@ -75,8 +75,8 @@ pub fn create_description() -> String {
     )
 }
 
-/// Parameters that are each in their range, and together beyond one limit: of candidates, of what is kept, of
-/// comparisons with the background.
+/// Three sets of parameters. In each, every parameter is in its range, and together they exceed one limit: that on
+/// candidates, on the kept state, or on comparisons with the background.
 fn too_much() -> [Params; 3] {
     let robust = || Preset::Robust.params();
     let large = || Params {

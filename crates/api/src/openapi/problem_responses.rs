@@ -1,5 +1,5 @@
-//! The problems that each operation may answer, and their responses in the OpenAPI document: one for the client's
-//! faults and one for the service's.
+//! The problems that each operation may answer, and their responses in the OpenAPI document: one response for the
+//! client's faults (`4XX`) and one for the service's (`5XX`).
 
 use crate::ProblemKind as Kind;
 use crate::media_types::PROBLEM;
@@ -65,7 +65,7 @@ const READ: &[Kind] = &[
     Kind::WorkTimeout,
 ];
 
-/// The problems of an operation, beside the one that every operation may answer.
+/// The problems of an operation, besides `Internal`, which every operation may answer.
 fn kinds(operation_id: &str) -> Vec<Kind> {
     use Kind::*;
     let kinds: &[&[Kind]] = match operation_id {
@@ -97,8 +97,8 @@ fn kinds(operation_id: &str) -> Vec<Kind> {
     kinds.concat()
 }
 
-/// The problem responses of an operation, by their classes of statuses. Each kind leads to its section of the page
-/// about problems, which stands beside the document's.
+/// The problem responses of an operation, by class of status (`4XX`, `5XX`). Each kind links to its section of the
+/// problems page, relative to the page of the document.
 pub(super) fn problem_responses(operation_id: &str) -> Map<String, Value> {
     let mut by_class: BTreeMap<u16, Vec<Kind>> = BTreeMap::new();
     for kind in kinds(operation_id).into_iter().chain([Kind::Internal]) {

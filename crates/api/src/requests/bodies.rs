@@ -1,4 +1,4 @@
-//! The bodies that have frames and settings in them, as a form and as JSON.
+//! The schemas of bodies: one file, or frames and settings as a form or as JSON.
 
 use super::{FrameCount, Settings};
 use crate::boxes::MAX_TARGETS;
@@ -14,7 +14,7 @@ use utoipa::openapi::schema::{
 use utoipa::openapi::{Ref, RefOr, Required};
 use utoipa::{Number, PartialSchema, ToSchema};
 
-/// A body that is one file, and the answer that is one.
+/// A body or an answer that is one file.
 #[derive(Debug)]
 pub struct BinaryBody;
 
@@ -108,7 +108,7 @@ impl<S: Settings> PartialSchema for JsonBody<S> {
                     .min_items(Some(1))
                     .description(Some("Several frames, in order."));
                 body.properties.insert("frames".to_owned(), frames.into());
-                // One of the two has to be there. A schema that says so in full makes generators require both.
+                // `frame` or `frames` is required. A schema that says so in full makes client generators require both.
                 body.min_properties = Some(1);
             }
         }
@@ -123,9 +123,9 @@ fn body_of(description: &str) -> Object {
     body
 }
 
-/// A setting as a part of a form: a text, as in the query.
+/// The schema of a setting as a part of a form: a text, as in the query.
 fn in_form(setting: Parameter) -> Option<RefOr<Schema>> {
-    // The field itself is private.
+    // The field `example` is private, but it is serialised.
     let example = serde_json::to_value(&setting).ok();
     let example = example.and_then(|setting| setting.get("example").cloned());
     Some(match setting.schema? {
@@ -138,8 +138,8 @@ fn in_form(setting: Parameter) -> Option<RefOr<Schema>> {
     })
 }
 
-/// A setting as a field of a JSON object. A box may be four numbers or a text, too; the document has the object alone,
-/// since typed clients can make nothing of a choice with arrays.
+/// The schema of a setting as a field of a JSON object. The parser takes a box as four numbers or as a text, too; the
+/// schema has the object alone, because typed clients cannot express a choice with arrays.
 fn in_json(setting: Parameter) -> RefOr<Schema> {
     let (description, null) = (setting.description, Object::with_type(Type::Null));
     let choice = |schema: RefOr<Schema>| {
@@ -171,7 +171,7 @@ fn in_json(setting: Parameter) -> RefOr<Schema> {
         _ => {}
     }
     if let Some(Number::UInt(max)) = schema.maximum {
-        // It may be a text, too: all of fewer digits than the greatest.
+        // The number may be a text, too. The pattern allows only numbers with fewer digits than the greatest.
         schema.schema_type = [Type::Integer, Type::String, Type::Null]
             .into_iter()
             .collect();

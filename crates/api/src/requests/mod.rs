@@ -1,9 +1,10 @@
-//! What the calls take: the settings of each, as the service reads them, and the bodies that have them.
+//! The settings of each call, as the service reads them, and the schemas of the bodies that carry them.
 //!
 //! In: the texts of settings, from the query, a form or a JSON object. Out: a struct for each call. Its schema, and
 //! those of the bodies with the same settings, go into the OpenAPI document; so the document says what is read.
 //!
-//! What can go wrong: a setting is unknown or no value of its type, which reading refuses with the setting's name.
+//! What can go wrong: a setting is unknown, or its value has the wrong type. The parser refuses it and names the
+//! setting.
 
 mod bodies;
 mod params;
@@ -33,7 +34,7 @@ pub enum FrameCount {
     Several,
 }
 
-/// The settings of one route. They are parsed from their texts, by `Deserialize`; `IntoParams` describes them.
+/// The settings of one route. `Deserialize` parses them from their texts; `IntoParams` describes them in the document.
 pub trait Settings: DeserializeOwned + IntoParams + Send + 'static {
     /// How many frames the route takes.
     const FRAMES: FrameCount;
@@ -41,6 +42,6 @@ pub trait Settings: DeserializeOwned + IntoParams + Send + 'static {
     const TAKES_SNAPSHOT: bool = false;
     /// Whether a video may come in place of the frames.
     const TAKES_VIDEO: bool = false;
-    /// What the names of the schemas of its bodies begin with.
+    /// The prefix of the names of its bodies' schemas.
     const SCHEMA_PREFIX: &'static str;
 }

@@ -5,16 +5,16 @@ use crate::{Parameters, PresetName};
 use bagtrack_tracker::{Params, Preset};
 use serde_json::{Map, Value};
 
-/// Why parameters cannot be set so: a sentence for the user.
+/// Why parameters are refused, as a sentence for the user.
 #[derive(Debug, thiserror::Error)]
 pub enum ParamsError {
-    /// None has this name, which is cut off where it is long.
+    /// There is no parameter of this name.
     #[error("There is no parameter `{name}`; the parameters are {}.", names())]
     Unknown {
-        /// The name.
+        /// The name, cut off after 64 characters.
         name: String,
     },
-    /// The value is none of its type.
+    /// The value has not the parameter's type.
     #[error("Parameter `{name}` cannot be {value}: {reason}.")]
     WrongType {
         /// The parameter.
@@ -29,11 +29,11 @@ pub enum ParamsError {
     Seed,
 }
 
-/// The parameters of these settings: those of the preset or the default one, with single ones set otherwise, and with
-/// `seed`, where there is one. Without any seed it is `random_seed`.
+/// The parameters of a request: those of the preset (or of the default one), changed by `overrides`. The seed is
+/// `seed`, else that of `overrides`, else `random_seed`.
 ///
 /// # Errors
-/// A parameter is unknown or has the wrong type.
+/// A parameter is unknown or has the wrong type, or the seed is too great.
 pub fn resolve_params(
     preset: Option<PresetName>,
     seed: Option<Seed>,
@@ -47,7 +47,7 @@ pub fn resolve_params(
     };
     let mut params = preset.params();
     params.seed = random_seed;
-    // One at a time, so that a value of the wrong type can be named.
+    // One at a time, so that the error can name the parameter with the wrong type.
     for (name, value) in overrides.unwrap_or_default().0 {
         if !is_public(&name) {
             let name = name.chars().take(64).collect();
@@ -74,19 +74,19 @@ pub fn resolve_params(
     Ok(params)
 }
 
-/// The values of the parameters that users set.
+/// The values of the parameters that users may set.
 pub fn public_params(params: &Params) -> Parameters {
     let mut fields = fields(params);
     fields.retain(|name, _| is_public(name));
     Parameters(fields)
 }
 
-/// Whether users set the parameter `name`. The others are the presets' own.
+/// Whether users may set the parameter `name`. All others are set by the presets alone.
 fn is_public(name: &str) -> bool {
     Params::TABLE.iter().any(|row| row.name == name)
 }
 
-/// All parameters by their names.
+/// All parameters by their names, those of the presets alone included.
 fn fields(params: &Params) -> Map<String, Value> {
     match serde_json::to_value(params) {
         Ok(Value::Object(object)) => object,
@@ -95,7 +95,7 @@ fn fields(params: &Params) -> Map<String, Value> {
     }
 }
 
-/// The names of the parameters that users set.
+/// The names of the parameters that users may set.
 fn names() -> String {
     let rows = Params::TABLE.iter();
     let names: Vec<String> = rows.map(|row| format!("`{}`", row.name)).collect();

@@ -1,4 +1,4 @@
-//! The types of single settings, each read from its text, and their schemas.
+//! The types of single settings, each parsed from its text, and their schemas.
 
 use crate::boxes::MAX_TARGETS;
 use crate::parameters::Parameters;
@@ -9,7 +9,7 @@ use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{KnownFormat, ObjectBuilder, Schema, SchemaFormat, SchemaType, Type};
 use utoipa::{Number, PartialSchema, ToSchema};
 
-/// Off, unless it is given: as `name`, `name=true` or `name=1`. Python clients write `True` and `False`.
+/// A setting that is off unless given, as `name`, `name=true` or `name=1`. Python clients write `True` and `False`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Switch(pub bool);
 
@@ -42,7 +42,7 @@ impl PartialSchema for FileFormatText {
 /// Most characters of a name in a file.
 const MAX_NAME: usize = 200;
 
-/// What something is called in a file. Documents have no signs in their texts that nobody can see.
+/// The name of a target or a video in a result file: 1 to 200 characters, none of them a control character.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Name(pub String);
 
@@ -51,7 +51,7 @@ impl TryFrom<String> for Name {
 
     fn try_from(text: String) -> Result<Self, String> {
         let is_name = (1..=MAX_NAME).contains(&text.chars().count());
-        // XML has none of these.
+        // XML 1.0 forbids most of these characters.
         let is_unseen = |sign: char| sign.is_control() || matches!(sign, '\u{fffe}' | '\u{ffff}');
         match is_name && !text.chars().any(is_unseen) {
             true => Ok(Self(text)),
@@ -68,7 +68,7 @@ impl<'de> Deserialize<'de> for Name {
     }
 }
 
-/// The names of the targets, at most as many as there can be: `van,rider`, or a JSON array where one has a comma.
+/// The names of the targets, at most [`MAX_TARGETS`]: `van,rider`, or a JSON array, which allows commas in names.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Names(pub Vec<Name>);
 
@@ -154,14 +154,14 @@ impl<'de, const MAX: u64> Deserialize<'de> for WholeNumber<MAX> {
     }
 }
 
-/// A float without a fraction as a whole number: JSON does not tell 46.0 from 46. None from 2^53 on, where a float does
-/// not tell neighbours apart.
+/// A float without a fraction as a whole number: to JSON, 46.0 and 46 are the same. `None` below 0, and from 2^53 on,
+/// where a float cannot hold every whole number.
 pub fn whole(value: f64) -> Option<u64> {
     let is_whole = value.fract() == 0.0 && (0.0..9_007_199_254_740_992.0).contains(&value);
     is_whole.then_some(value as u64)
 }
 
-/// The schema of a whole number from 0 to this one.
+/// The schema of a whole number from 0 to `max`.
 pub fn number_schema(schema_type: impl Into<SchemaType>, max: u64) -> ObjectBuilder {
     let format = match i32::try_from(max) {
         Ok(_) => KnownFormat::Int32,
@@ -185,7 +185,7 @@ impl<const MAX: u64> PartialSchema for WholeNumber<MAX> {
     }
 }
 
-/// A number in `x,y,width,height`; the last two are above 0.
+/// The pattern of a number in `x,y,width,height`, without a sign.
 const NUMBER: &str = r"(?:[0-9]{1,5}(?:\.[0-9]{1,4})?)";
 
 /// The schema of a text of this format.
@@ -240,7 +240,7 @@ impl PartialSchema for ParametersText {
 impl ToSchema for Parameters {}
 
 impl PartialSchema for Parameters {
-    /// An object. Which parameters there are is the tracker's: the service puts them in.
+    /// A placeholder: `openapi::document` puts the schema of the tracker's parameters in its place.
     fn schema() -> RefOr<Schema> {
         ObjectBuilder::new().into()
     }
