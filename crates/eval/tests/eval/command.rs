@@ -1,4 +1,4 @@
-//! The program `bagtrack-eval`, run on synthetic clips, and the tracker beside it.
+//! Runs the program `bagtrack-eval` on synthetic clips, and the tracker itself on the same clips.
 
 use bagtrack_ingest::{Limits, decode_to};
 use bagtrack_sample::{Clip, Format, Settings};
@@ -26,7 +26,7 @@ pub fn fails(args: &[&str]) -> String {
     command::failure(PROGRAM, eval(args))
 }
 
-/// A small sample clip of so many frames under `parent`.
+/// A small sample clip of `frames` frames in the folder `name` under `parent`.
 pub fn clip(parent: &Path, name: &str, seed: u64, frames: u32) -> PathBuf {
     let dir = parent.join(name);
     let settings = Settings {
@@ -40,7 +40,7 @@ pub fn clip(parent: &Path, name: &str, seed: u64, frames: u32) -> PathBuf {
     dir
 }
 
-/// The answers of a tracker that follows the first annotated box of a clip.
+/// The tracker's answers to the frames of a clip after the first, from the box `first` on.
 pub fn tracked(dir: &Path, first: bagtrack_tracker::Rect, params: Params) -> Vec<Estimate> {
     let frames = bagtrack_cli::frames::list(dir).expect("the clip has frames");
     let limits = Limits::default();

@@ -1,4 +1,4 @@
-//! The evaluation: its program, synthetic clips, and the accuracy that is promised.
+//! Tests of the evaluation: its program, the synthetic clips, and the promised accuracy.
 
 mod command;
 mod model;

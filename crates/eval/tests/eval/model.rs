@@ -1,4 +1,4 @@
-//! `bagtrack-eval --model`: measured with a second opinion.
+//! `bagtrack-eval --model`: the tracker is measured with an expert beside it.
 
 use crate::command::{clip, fails, folder, succeeds, text};
 use bagtrack_siamese::NanoTrack;
@@ -27,7 +27,7 @@ fn a_network_has_a_part_in_the_figures() {
     assert!(refused.contains("head.onnx.gone"), "{refused}");
 }
 
-/// Says what the service says of a clip of a set, with the files that `BAGTRACK_NANOTRACK` names.
+/// With the files that `BAGTRACK_NANOTRACK` names, on an annotated sequence.
 #[test]
 #[ignore = "needs the annotated sequences (BAGTRACK_SEQUENCES) and NanoTrack's files (BAGTRACK_NANOTRACK=BACKBONE,HEAD)"]
 fn nanotrack_itself_keeps_the_filter_on_a_can_that_turns() {

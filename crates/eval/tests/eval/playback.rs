@@ -1,4 +1,4 @@
-//! `bagtrack-eval` on sequences that are played backwards, or from a share of their length on.
+//! `bagtrack-eval` on sequences that are played backwards, or that begin after a share of their length.
 
 use crate::command::{clip, eval, fails, folder, succeeds, text};
 use bagtrack_sample::{Clip, Format, Settings};
@@ -19,7 +19,7 @@ fn report(dir: &Path, args: &[&str]) -> Value {
     report
 }
 
-/// A copy of a clip under the same name, with these of its frames, counted from 1, in this order.
+/// A copy of a clip under the same name, with the given frames, counted from 1, in the given order.
 fn recut(clip: &Path, parent: &Path, frames: impl Iterator<Item = usize>) -> PathBuf {
     let dir = parent.join(clip.file_name().expect("a clip has a name"));
     fs::create_dir_all(dir.join("img")).expect("the folder is writable");
@@ -37,7 +37,7 @@ fn recut(clip: &Path, parent: &Path, frames: impl Iterator<Item = usize>) -> Pat
     dir
 }
 
-/// A copy of the clip that is cut in this way is tracked as the clip itself with these flags.
+/// Asserts that a copy of a clip with these `frames` is tracked as the clip itself with these `flags`.
 fn same(flags: &[&str], frames: impl Iterator<Item = usize>, playback: &Value) {
     let (parent, elsewhere) = (folder(), folder());
     let dir = clip(parent.path(), "clip", 0, 12);
@@ -46,7 +46,7 @@ fn same(flags: &[&str], frames: impl Iterator<Item = usize>, playback: &Value) {
     let fields = played.as_object_mut().expect("a report");
     assert_eq!(fields.remove("playback").as_ref(), Some(playback));
     assert_eq!(played, report(&copy, &[]), "{flags:?}");
-    // It is not what the clip gives from its first frame on.
+    // The flags have an effect: without them the results differ.
     let usual = report(&dir, &[]);
     assert_ne!(played["sequences"], usual["sequences"], "{flags:?}");
     assert_eq!(usual.get("playback"), None);
@@ -72,7 +72,8 @@ fn first_boxes_that_are_off_are_told_and_each_seed_has_another() {
     flags.extend(still.iter().flat_map(|set| ["--set", set]));
     let off = report(&dir, &flags);
     assert_eq!(off["playback"]["first_box_error"], 0.2);
-    // The boxes stay where they began: a fifth of a side to the right with the first seed, to the left with the second.
+    // The boxes stay where they began: with the first seed a fifth of their width right of the target, with the second
+    // left of it.
     let errors =
         |report: &Value| [0, 1].map(|seed| report["seed_means"][seed]["center_error"].clone());
     let [first, second] = errors(&off);
@@ -84,7 +85,7 @@ fn first_boxes_that_are_off_are_told_and_each_seed_has_another() {
     assert_eq!(output.status.code(), Some(2));
 }
 
-/// The size of the first box decides in which size the frames are decoded.
+/// Frames are decoded in a size that depends on the size of the first box.
 #[test]
 fn a_first_box_of_another_size_has_frames_of_its_own() {
     let parent = folder();
@@ -134,7 +135,8 @@ fn backwards_the_share_is_counted_from_the_end() {
 fn the_run_starts_with_the_box_of_the_last_annotated_frame() {
     let parent = folder();
     let dir = clip(parent.path(), "clip", 0, 12);
-    // A box that stays is as far off as the annotations are from where it began: the tenth frame, at (50, 60).
+    // The tracked box stays at the target of the tenth frame, (50, 60); each error is the annotation's distance from
+    // there.
     let mut truth = "51,61,40,40\n".to_owned() + &"0,0,0,0\n".repeat(6);
     truth += "54,65,40,40\n51,61,40,40\n51,61,40,40\n0,0,0,0\n0,0,0,0\n";
     fs::write(dir.join(BOXES), truth).expect("the folder is writable");
@@ -148,7 +150,7 @@ fn the_run_starts_with_the_box_of_the_last_annotated_frame() {
     );
     let error = figures["center_error"].as_f64().expect("a number");
     assert!((error - 5.0 / 3.0).abs() < 1e-6, "{error}");
-    // With the first frame as the only one left of the annotations there is nothing to score.
+    // If only the first of the frames left is annotated, there is nothing to score.
     flags.extend(["--start-at", "0.5"]);
     let mut args = vec![text(&dir)];
     args.extend(&flags);
@@ -157,7 +159,7 @@ fn the_run_starts_with_the_box_of_the_last_annotated_frame() {
         line.contains("at least one more must be annotated"),
         "{line}"
     );
-    // And without any of them nothing to begin with.
+    // If none of the frames left is annotated, there is no box to begin with.
     let line = fails(&[text(&dir), "--start-at", "0.9"]);
     assert!(
         line.contains(text(&dir)) && line.contains("from 0.9 of the frames on"),

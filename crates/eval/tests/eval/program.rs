@@ -1,4 +1,4 @@
-//! `bagtrack-eval`, as a person types it and as a program reads it.
+//! The command line of `bagtrack-eval`, its table for people and its JSON report.
 
 use crate::command::{clip, fails, folder, succeeds, text};
 use serde_json::Value;
@@ -16,7 +16,7 @@ const FIELDS: [&str; 8] = [
     "step_ms",
 ];
 
-/// The report of these sequences as JSON, with flags that have spaces between them.
+/// The report of these sequences as JSON; `flags` are separated by spaces.
 fn report(dirs: &[&PathBuf], flags: &str) -> Value {
     let mut args: Vec<&str> = dirs.iter().map(|dir| text(dir)).collect();
     args.extend(flags.split_whitespace());
@@ -112,8 +112,8 @@ fn jobs_change_the_time_only() {
 fn a_tracker_that_cannot_move_is_measured_as_a_box_that_stays() {
     let parent = folder();
     let dir = clip(parent.path(), "clip", 0, 12);
-    // Tracked: 50, 60, 40 x 40 for ever. Annotated: there, not at all, moved by (3, 4), moved by 20 to the right,
-    // half as wide and high at the same centre, then never.
+    // The tracked box stays at (50, 60), 40 x 40 pixels. The annotations, frame by frame: the same box, none, moved by
+    // (3, 4), moved by 20 to the right, half as wide and high at the same centre, then none.
     let mut truth = "51,61,40,40\n0,0,0,0\n54,65,40,40\n71,61,40,40\n61,71,20,20\n".to_owned();
     truth += &"0,0,0,0\n".repeat(7);
     fs::write(dir.join("groundtruth_rect.txt"), truth).expect("the folder is writable");
@@ -134,7 +134,8 @@ fn a_tracker_that_cannot_move_is_measured_as_a_box_that_stays() {
     let shifted = 37.0 * 36.0;
     let overlaps = [shifted / (3200.0 - shifted), 800.0 / 2400.0, 400.0 / 1600.0];
     close("overlap", overlaps.iter().sum::<f64>() / 3.0);
-    // Thresholds exceeded: 0.7128 those up to 0.7 (15), 0.3333 up to 0.3 (7), 0.25 up to 0.2 (5).
+    // Of the 21 thresholds 0, 0.05, … 1, the overlap 0.7128 exceeds 15 (up to 0.7), 0.3333 exceeds 7 (up to 0.3), and
+    // 0.25 exceeds 5 (up to 0.2).
     close("success_auc", (15.0 + 7.0 + 5.0) / 63.0);
 }
 
@@ -157,7 +158,7 @@ fn the_table_has_a_row_for_each_sequence_and_the_mean() {
         rows.iter().all(|row| row.len() == rows[0].len()),
         "columns are not aligned:\n{table}"
     );
-    // One sequence has no standard error, and none to learn calibration from.
+    // With one sequence there is no standard error, and no other sequence to learn the calibration from.
     let lines: Vec<&str> = lines.lines().collect();
     assert_eq!(lines.len(), 2, "{table}");
     assert!(

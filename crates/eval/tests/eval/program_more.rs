@@ -1,4 +1,4 @@
-//! What `bagtrack-eval` tells beyond the means: seeds, the score, variants side by side.
+//! The report of `bagtrack-eval` beyond the means: each seed, the score's quality, variants side by side.
 
 use crate::command::{clip, folder, succeeds, text, tracked};
 use bagtrack_cli::{assign, parse_assignment};
@@ -29,7 +29,7 @@ fn close(found: &Value, expected: f64) {
     );
 }
 
-/// Two clips on which the seeds differ.
+/// Two clips on which different seeds give different results.
 fn clips(parent: &Path) -> [String; 2] {
     ["one", "two"].map(|name| {
         let seed = if name == "one" { 1 } else { 2 };
@@ -49,7 +49,7 @@ fn seed_means_are_means_over_the_sequences_and_the_worst_is_among_them() {
         let sum: f64 = means.iter().map(|mean| number(&mean[field])).sum();
         close(&report["mean"][field], sum / 3.0);
     }
-    // The first seed alone is the evaluation with one seed.
+    // The figures of the first seed are those of an evaluation with one seed.
     let single = json(&[&one, &two, "--preset", "paper", "--seeds", "1"]);
     assert_eq!(single["seed_means"][0], means[0]);
     close(
@@ -82,14 +82,15 @@ fn the_score_is_held_against_the_overlap() {
     let still = ["motion_std_x=0", "motion_std_y=0", "motion_std_scale=0"];
     let mut args = vec![text(&dir), "--preset", "paper", "--seeds", "2"];
     args.extend(still.iter().flat_map(|set| ["--set", set]));
-    // A box that stays, on boxes that are all elsewhere but in the second frame: 1 hit of 14 with each seed.
+    // The tracked box stays, and all annotations but those of the first two frames are elsewhere: 1 hit of 14 with each
+    // seed.
     let mut truth = "51,61,40,40\n52,61,40,40\n".to_owned();
     truth += &"201,161,40,40\n".repeat(13);
     fs::write(dir.join("groundtruth_rect.txt"), &truth).expect("the folder is writable");
     let score = json(&args)["score"].clone();
     assert_eq!(score["frames"], 28);
     assert_eq!(score["ece_leave_one_out"], Value::Null);
-    // The scores as the tracker tells them: of each hit, the share of misses that have a lower one.
+    // The expected figure, from the tracker's own scores: the share of misses with a lower score than the hit.
     let scores = [0, 1].map(|seed| {
         let set: Vec<_> = still.iter().map(|set| parse_assignment(set)).collect();
         let set = set.into_iter().collect::<Result<Vec<_>, _>>();
@@ -110,7 +111,7 @@ fn the_score_is_held_against_the_overlap() {
     });
     close(&score["roc_auc"], won.sum::<f64>() / (2.0 * 26.0));
     let error = number(&score["ece"]);
-    // Misses alone have no ROC curve, and then the calibration error is the mean score.
+    // With misses alone there is no ROC curve, and the calibration error is the mean score.
     let truth = truth.replace("52,61,40,40", "201,161,40,40");
     fs::write(dir.join("groundtruth_rect.txt"), truth).expect("the folder is writable");
     let misses = json(&args)["score"].clone();
@@ -121,7 +122,7 @@ fn the_score_is_held_against_the_overlap() {
         (number(&misses["ece"]) - mean).abs() < 1e-6,
         "{misses}, not {mean}"
     );
-    // Two sequences: one to learn from.
+    // With two sequences, the calibration of each can be learned from the other.
     let other = clip(parent.path(), "other", 0, 15);
     let mut both = args.clone();
     both.push(text(&other));

@@ -1,4 +1,5 @@
-//! `bagtrack-eval --results`, the boxes as other toolkits read them, and `--frames`, the figures of each frame.
+//! `bagtrack-eval --results`, which writes the boxes as other toolkits read them, and `--frames`, which writes the
+//! figures of each frame.
 
 use crate::command::{clip, eval, fails, folder, succeeds, text, tracked};
 use bagtrack_cli::parse_boxes;
@@ -29,7 +30,7 @@ fn each_sequence_and_seed_has_a_file_of_the_boxes_that_track_gives() {
             assert!(written.overlap(&tracked.target) > 0.999, "{written:?}");
         }
     }
-    // One seed needs no folder of its own, and older files make way.
+    // The results of a single seed need no folder of their own; existing files are overwritten.
     succeeds(&args);
     let first = fs::read_to_string(results.join("one.txt")).expect("the file is there");
     assert_eq!(
@@ -91,7 +92,7 @@ fn each_scored_frame_has_a_line_with_its_figures_and_what_its_score_is_made_of()
         let served = line["score"].as_f64().expect("a number");
         assert!((score - served).abs() < 1e-6, "{line}");
     }
-    // Without a discriminant the score is made of something else.
+    // Without a discriminant there are no predictors of the score.
     succeeds(&[text(&one), "--preset", "paper", "--frames", text(&file)]);
     let written = fs::read_to_string(&file).expect("the file is there");
     assert!(written.lines().count() == 11 && written.contains("\"predictors\":null"));

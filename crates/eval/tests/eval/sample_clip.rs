@@ -1,4 +1,4 @@
-//! The synthetic clip: its ground truth is where the card really is, and what is promised to happen happens.
+//! The synthetic clip: the ground truth is the drawn card's place, and the events that the clip announces are drawn.
 
 use bagtrack_ingest::{Limits, decode};
 use bagtrack_sample::{Clip, Settings};
@@ -16,13 +16,13 @@ fn clip(seed: u64) -> Clip {
 /// Frames in full light with nothing in front of the card.
 const PLAIN: [u32; 11] = [0, 9, 18, 27, 36, 73, 80, 115, 126, 137, 149];
 
-/// `card` with a margin, as far as whether (x, y) is in it.
+/// Whether (x, y) is in `card`, widened by `margin` on each side.
 fn near(card: Rect, margin: f64, x: f64, y: f64) -> bool {
     (card.x - margin..card.x + card.width + margin).contains(&x)
         && (card.y - margin..card.y + card.height + margin).contains(&y)
 }
 
-/// Left, top, right and bottom edge of what differs between two pictures, except near `left_out`.
+/// The left, top, right and bottom edges of the area in which two pictures differ, without the area near `left_out`.
 fn bounds(picture: &RgbImage, other: &RgbImage, left_out: Rect) -> [f64; 4] {
     let (width, height) = picture.dimensions();
     let differs = |x: u32, y: u32| {
@@ -34,7 +34,7 @@ fn bounds(picture: &RgbImage, other: &RgbImage, left_out: Rect) -> [f64; 4] {
         pair.map(|(a, b)| u32::from(a.abs_diff(b))).sum::<u32>() > 60
             && !near(left_out, 3.0, f64::from(x), f64::from(y))
     };
-    // A column or row of the card has many such pixels.
+    // A column or row that crosses the card has more than 12 differing pixels.
     let columns = (0..width).filter(|&x| (0..height).filter(|&y| differs(x, y)).count() > 12);
     let rows = (0..height).filter(|&y| (0..width).filter(|&x| differs(x, y)).count() > 12);
     let ends = |of: Vec<u32>| {
@@ -54,14 +54,14 @@ fn the_ground_truth_is_where_the_card_is_drawn() {
         for index in PLAIN {
             let card = clip.target(index);
             let truth = [card.x, card.y, card.x + card.width, card.y + card.height];
-            // A frame with the card elsewhere shows the wall here.
+            // Another frame, in which the card is elsewhere, shows the bare wall here.
             let elsewhere = PLAIN
                 .into_iter()
                 .find(|&other| grown(card).overlap(&clip.target(other)) == 0.0);
             let Some(other) = elsewhere else { continue };
             let seen = bounds(&clip.draw(index), &clip.draw(other), clip.target(other));
             for (seen, truth) in seen.into_iter().zip(truth) {
-                // Half a pixel of rounding, and as much of a pixel as the card may fill unnoticed.
+                // Half a pixel of rounding, and half a pixel that the card may cover without a visible difference.
                 assert!(
                     (seen - truth).abs() <= 1.0,
                     "seed {seed}, frame {index}: {seen} for {truth}"

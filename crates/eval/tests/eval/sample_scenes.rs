@@ -1,11 +1,11 @@
-//! The clips in which the target goes out of sight: nothing of it is seen when the clip says so, and something when
-//! not.
+//! The clips in which the target goes out of sight: it is drawn in exactly the frames in which the clip says that it is
+//! visible.
 
 use bagtrack_cli::read_boxes;
 use bagtrack_sample::{Attributes, Clip, Format, Scene, Settings};
 use image::RgbImage;
 
-/// More than any two pictures of the same thing differ by through the sensor's noise (2.5 of 255 a channel).
+/// Two pictures of the same scene differ by less than this in every channel; the sensor's noise is 2.5 of 255.
 const NOISE: u8 = 28;
 
 fn clip(scene: Scene, seed: u64) -> Clip {
@@ -17,7 +17,7 @@ fn clip(scene: Scene, seed: u64) -> Clip {
     .expect("the settings are in order")
 }
 
-/// The frames in which nothing of the target is seen, which must be in a row.
+/// The frames in which the clip says that nothing of the target is visible; they must be consecutive.
 fn out_of_sight(clip: &Clip) -> std::ops::Range<u32> {
     let hidden: Vec<u32> = (0..clip.frames())
         .filter(|&index| clip.visible(index) == 0.0)
@@ -35,8 +35,8 @@ fn changed(one: &RgbImage, other: &RgbImage) -> usize {
         .count()
 }
 
-/// The card moves in every frame, so pictures that differ by noise alone show nothing of it, and do not tell where
-/// it is.
+/// Asserts that the card is invisible in the `hidden` frames, and visible in all others. The card moves in every frame,
+/// so two pictures that differ by noise alone show nothing of it.
 fn nothing_is_seen_then_and_only_then(clip: &Clip, hidden: std::ops::Range<u32>) {
     let empty = clip.draw(hidden.start);
     for index in hidden.clone() {
@@ -65,7 +65,7 @@ fn behind_the_post_nothing_is_seen_for_20_frames() {
         let hidden = out_of_sight(&clip);
         assert_eq!(hidden.len(), 20, "seed {seed}");
         nothing_is_seen_then_and_only_then(&clip, hidden.clone());
-        // It moves on behind the post by more than its own width, and stays in the frame.
+        // Behind the post the card moves on by more than its own width, and stays in the frame.
         let (before, after) = (clip.target(hidden.start), clip.target(hidden.end));
         assert!((before.x - after.x).abs() > before.width, "seed {seed}");
         for index in 0..clip.frames() {
@@ -169,7 +169,7 @@ fn frames_out_of_sight_are_not_annotated_in_the_folder() {
     }
 }
 
-/// A clip that is hard in this way.
+/// A short clip with changed attributes.
 fn hard(change: impl Fn(&mut Attributes)) -> Clip {
     let mut settings = Settings {
         frames: 40,
@@ -179,7 +179,7 @@ fn hard(change: impl Fn(&mut Attributes)) -> Clip {
     Clip::new(settings).expect("the attributes are in their ranges")
 }
 
-/// The sums of the differences between a picture and itself moved by so many pixels.
+/// The sum of the differences between `before`, moved by (right, down) pixels, and `after`.
 fn misfit(before: &RgbImage, after: &RgbImage, (right, down): (i64, i64)) -> u64 {
     let (width, height) = before.dimensions();
     let inside =
@@ -210,7 +210,7 @@ fn the_true_box_follows_each_attribute() {
     let aspects = [0, 19, 39].map(|index| thin.target(index).width / thin.target(index).height);
     assert!(aspects[1] < 0.31 * aspects[0] && (aspects[2] - aspects[0]).abs() < 1e-9);
     let turning = hard(|attributes| attributes.in_plane_rotation = 9.0);
-    // After ten frames width and height have changed places.
+    // After ten frames, a quarter turn, width and height are swapped.
     let (upright, lying) = (plain.target(10), turning.target(10));
     assert!(
         (lying.width - upright.height).abs() < 1e-6 && (lying.height - upright.width).abs() < 1e-6

@@ -1,15 +1,16 @@
-//! The status of the default parameters on clips in which the target goes out of sight, behind a post or out of the
-//! frame: `lost` soon after it is, never `tracking` on something else, and `tracking` again, by itself, some time after
-//! it came back.
+//! The status with the default parameters, on clips in which the target goes behind a post or out of the frame: `lost`
+//! soon after the target is out of sight, never `tracking` on something else, and `tracking` again, without help, some
+//! time after it came back.
 
 use bagtrack_sample::{Clip, Scene, Settings};
 use bagtrack_tracker::{Estimate, Frame, Preset, ScoreModel, Status, Tracker};
 
-/// Frames that the status may take to notice: a quarter of a second of a usual video.
+/// Most frames until the status follows a change: a quarter of a second of a usual video.
 const NOTICED: u32 = 6;
-/// Of the 20 or 25 frames in which the target is out of sight, how many must say so; the others are `uncertain`.
+/// The target is out of sight for 20 or 25 frames; at least so many of their answers must be `lost`, and the others
+/// `uncertain`.
 const LEAST_LOST: u32 = 10;
-/// Frames at the end of a clip in which the target must have been found again.
+/// The last frames of a clip, in which the target must have been found again.
 const END: u32 = 20;
 
 fn frame(clip: &Clip, index: u32) -> Frame {
@@ -51,7 +52,7 @@ fn is_lost_and_found_again(scene: Scene) {
         ..Settings::default()
     })
     .expect("the settings are in order");
-    // To draw them takes longer than to track.
+    // The frames are drawn once for all seeds, because drawing takes longer than tracking.
     let frames: Vec<_> = (0..clip.frames())
         .map(|index| frame(&clip, index))
         .collect();

@@ -1,4 +1,4 @@
-//! The shipped evaluation against the textbook version on frames of real video.
+//! The shipped evaluation of candidates against the textbook version, on frames of real videos.
 
 use std::path::{Path, PathBuf};
 
@@ -34,7 +34,7 @@ fn frames_of_real_video_agree() {
             .zip(boxes)
             .filter_map(|(path, target)| Some((path, target?)))
             .collect();
-        // The looks of the target at every annotated frame, up to a bound: enough for a history and a bag.
+        // The target's patches in the first annotated frames: enough for a history and a bag.
         let looks: Vec<Vec<f32>> = known
             .iter()
             .take(90)

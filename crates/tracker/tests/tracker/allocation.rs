@@ -1,9 +1,9 @@
-//! After warm-up a step allocates nothing: counted by an allocator that counts.
+//! After some frames of warm-up, a step allocates nothing, as a counting allocator shows.
 
 use bagtrack_testing::scene::{near, panned};
 use bagtrack_tracker::{Frame, Params, Preset, Rect, Status, Tracker};
 
-/// A target that is held: the bag of one that is not is still growing when others are full.
+/// A scene whose target is held: where a target is not held, the bag fills later, and allocates meanwhile.
 fn frame(t: usize) -> Frame {
     panned(t, (0, 0)).0
 }
@@ -13,7 +13,7 @@ fn tracker(params: Params) -> Tracker {
     Tracker::new(&frame, target, params).expect("a box in the frame")
 }
 
-/// The number of allocations of frames `from` to `until`.
+/// The number of allocations in the steps of frames `from` to `until`, the last excluded.
 fn allocations(tracker: &mut Tracker, from: usize, until: usize) -> u64 {
     let frames: Vec<Frame> = (from..until).map(frame).collect();
     let counted = allocation_counter::measure(|| {
@@ -30,7 +30,8 @@ fn the_counter_counts() {
     assert_eq!(counted.count_total, 1);
 }
 
-/// Frames in which the bag takes an entry in place of another and in which the background is renewed among them.
+/// Among the counted frames are some in which the bag replaces an entry, and some in which the background samples are
+/// renewed.
 #[test]
 fn a_warm_step_allocates_nothing() {
     for preset in [Preset::Paper, Preset::Robust] {
@@ -43,7 +44,7 @@ fn a_warm_step_allocates_nothing() {
     }
 }
 
-/// What is seen of a large target is a picture in larger pixels.
+/// A large target is tracked in a working image of larger pixels.
 #[test]
 fn a_warm_step_of_a_large_target_allocates_nothing() {
     let scene = |t| near(t, (110, 96));
@@ -58,7 +59,7 @@ fn a_warm_step_of_a_large_target_allocates_nothing() {
     }
 }
 
-/// The same scene in colour: chroma has channels of its own and a histogram of other sizes.
+/// The same scene in colour: chroma has its own channels, and the colour histogram has another size.
 fn colored(t: usize) -> Frame {
     let luma = frame(t);
     let rgb: Vec<u8> = luma
@@ -83,7 +84,7 @@ fn a_warm_step_in_colour_allocates_nothing() {
     }
 }
 
-/// The search widens from frame to frame, up to its limit.
+/// While the target is lost, the search area grows from frame to frame, up to its limit.
 #[test]
 fn the_search_for_a_lost_target_allocates_nothing() {
     let mut tracker = tracker(Preset::Robust.params());
@@ -98,7 +99,8 @@ fn the_search_for_a_lost_target_allocates_nothing() {
     }
 }
 
-/// A thread that was warm for one session is warm for the next of its kind, but for what that keeps.
+/// A thread that has warmed up for one session needs no warm-up for the next of its kind: only that session's own state
+/// is allocated.
 #[test]
 fn sessions_of_one_kind_in_turns_allocate_nothing() {
     let mut trackers = [0, 1].map(|seed| {

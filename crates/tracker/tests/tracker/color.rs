@@ -1,4 +1,4 @@
-//! Colour: what it tells that luma does not, and that sessions without it are not changed by it.
+//! Colour helps where luma does not suffice, and changes nothing in sessions that began in gray.
 
 use bagtrack_tracker::{Frame, Preset, Rect, Tracker};
 
@@ -6,7 +6,7 @@ const WIDTH: usize = 200;
 const HEIGHT: usize = 160;
 const SIDE: f64 = 32.0;
 
-/// Where the target is in frame `t`: it passes its twin.
+/// The target's box in frame `t`. It moves right, and passes its twin, which moves left.
 fn target(t: usize) -> Rect {
     Rect::new(20.0 + 3.0 * t as f64, 60.0, SIDE, SIDE)
 }
@@ -30,7 +30,7 @@ fn rgb(t: usize) -> Vec<u8> {
                 2
             }
         };
-        // The twin passes in front.
+        // The twin passes in front of the target.
         if inside(twin(t), x, y) {
             return [0, 51 * stripe(twin(t)), 0];
         }
@@ -51,7 +51,7 @@ fn gray(t: usize) -> Frame {
     Frame::from_luma(WIDTH as u32, HEIGHT as u32, luma).expect("a frame of this size")
 }
 
-/// The overlap in the last frame, after the two have passed, of one seed.
+/// The overlap with one seed in the last frame, after the two have passed each other.
 fn last_overlap(frame: impl Fn(usize) -> Frame, seed: u64) -> f64 {
     let mut params = Preset::Robust.params();
     params.seed = seed;
@@ -69,7 +69,7 @@ fn a_red_target_is_not_taken_for_its_green_twin_that_passes_in_front() {
     }
 }
 
-/// Without colour nothing but its way tells the target from its twin.
+/// Without colour only its motion distinguishes the target from its twin.
 #[test]
 fn the_same_clip_in_gray_is_followed_by_most_seeds() {
     let held = (0..8).filter(|&seed| last_overlap(gray, seed) > 0.6);
@@ -77,7 +77,7 @@ fn the_same_clip_in_gray_is_followed_by_most_seeds() {
     assert!(held.len() >= 6, "{held:?}");
 }
 
-/// A red disc on green of the same luma: in gray there is nothing to see.
+/// A red disc on green of the same luma: in gray it is invisible.
 #[test]
 fn a_target_that_only_color_shows_is_followed() {
     let scene = |t: usize| -> Vec<u8> {
@@ -98,7 +98,7 @@ fn a_target_that_only_color_shows_is_followed() {
     assert!(seen > 0.6 && unseen < 0.2, "{seen} {unseen}");
 }
 
-/// A session that began in gray has nothing to compare colours with.
+/// A session that began in gray has no colours to compare with, so it uses luma alone.
 #[test]
 fn a_session_that_began_in_gray_sees_the_luma_of_colored_frames() {
     let begin = || {
@@ -113,7 +113,7 @@ fn a_session_that_began_in_gray_sees_the_luma_of_colored_frames() {
     }
 }
 
-/// A camera that falls back to gray at night.
+/// As with a camera that switches to gray at night.
 #[test]
 fn a_session_in_color_takes_gray_frames_and_holds_the_target() {
     let params = Preset::Robust.params();
@@ -161,7 +161,8 @@ fn a_frame_of_bgr_triples_is_that_of_their_rgb_triples() {
     assert!(Frame::from_bgr(size.0, size.1, &swapped[1..]).is_err());
 }
 
-/// A frame of 1280 x 960 whose target is 40 pixels wide is seen in full; one whose target is 640 wide is not.
+/// A frame of 1280 x 960 is tracked at full resolution if its target is 40 pixels wide, and at a lower one if it is 640
+/// wide.
 #[test]
 fn the_resolution_follows_the_target() {
     let luma = (0..1280 * 960)
@@ -177,7 +178,7 @@ fn the_resolution_follows_the_target() {
     assert_eq!(size(Rect::new(300.0, 200.0, 640.0, 480.0)), (320, 240));
 }
 
-/// The largest state there is: full resolution, colour, a full bag.
+/// The largest state of a session: full resolution, colour, a full bag.
 #[test]
 fn a_session_of_full_resolution_keeps_at_most_128_kib() {
     let rgb: Vec<u8> = (0..3 * 1280 * 960)

@@ -1,4 +1,4 @@
-//! Input at the edge of what has an answer: a finite box or a typed error, never NaN, never a panic.
+//! Extreme input gets a finite box or a typed error, never NaN, never a panic.
 
 use bagtrack_testing::scene::{flat, frame, params, robust, variants};
 use bagtrack_tracker::{Estimate, Frame, MIN_BOX_SIDE, Params, Rect, Tracker, TrackerError};
@@ -9,7 +9,7 @@ fn assert_sound(answer: &Estimate) {
     assert!((0.0..=1.0).contains(&answer.score), "{answer:?}");
 }
 
-/// Starts on the first frame, steps through the rest, and carries a snapshot over every step.
+/// Starts on the first frame, steps through the rest, and takes and restores a snapshot after every step.
 fn run(frames: &[Frame], target: Rect, params: Params) -> Vec<Estimate> {
     let mut tracker = Tracker::new(&frames[0], target, params).expect("an acceptable box");
     frames[1..]
@@ -23,7 +23,7 @@ fn run(frames: &[Frame], target: Rect, params: Params) -> Vec<Estimate> {
         .collect()
 }
 
-/// The same with both presets, and with each extension off.
+/// As [`run`], with both presets, and with each extension switched off.
 fn run_variants(frames: &[Frame], target: Rect, seed: u64) {
     for (name, params) in variants(seed) {
         println!("{name}");
@@ -60,7 +60,7 @@ fn equal_distances_give_the_first_particle() {
     let target = Rect::new(140.0, 100.0, 40.0, 40.0);
     let frames = [flat(320, 240, 90), flat(320, 240, 90)];
     for seed in 0..20 {
-        // Particles are drawn one after the other, so the only one of one is the first of many.
+        // Particles are drawn one after the other, so the single particle of one run is the first of 100 in the other.
         let [one, many] = [1, 100].map(|particles| {
             let params = Params {
                 particles,
@@ -75,9 +75,9 @@ fn equal_distances_give_the_first_particle() {
 
 #[test]
 fn equal_distances_give_equal_weights() {
-    // Of two particles the first is the answer. If the next one comes from either of them with the same chance, a
-    // step of the answer is one step of the motion, or, from the other particle, the difference of that to the answer
-    // more: its variance is 1 + 2 / 2 of that of the motion. With all weight on the first it would be 1, on the
+    // Of two particles with equal weights the first is the answer. With equal chances, the next answer descends from
+    // the answer itself (the variance of its step is that of the motion, 1) or from the second particle (1, and 2 for
+    // the difference of the two particles): 2 on average. With all weight on the first particle it would be 1, on the
     // second 3.
     let target = Rect::new(140.0, 100.0, 40.0, 40.0);
     let frames = vec![flat(320, 240, 90); 3];
@@ -101,7 +101,7 @@ fn equal_distances_give_equal_weights() {
 
 #[test]
 fn nothing_draws_the_box_away_where_nothing_can_be_told_apart() {
-    // Every place is as likely as the last one, and the prior on the displacement prefers that.
+    // All places look alike, so the prior on the displacement decides, which prefers the last place.
     let target = Rect::new(140.0, 100.0, 40.0, 40.0);
     for seed in 0..4 {
         for answer in run(&vec![flat(320, 240, 90); 5], target, robust(seed)) {

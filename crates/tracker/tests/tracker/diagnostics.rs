@@ -1,4 +1,4 @@
-//! Diagnostics of a step, for those who ask.
+//! Diagnostics of a step.
 
 use bagtrack_testing::scene::{frame, target};
 use bagtrack_tracker::{Preset, Tracker};
@@ -20,7 +20,7 @@ fn a_step_with_diagnostics_answers_like_one_without() {
             assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
             assert!((seen.votes.iter().sum::<f64>() - 1.0).abs() < 1e-9);
             assert!(!seen.votes.is_empty() && seen.votes.len() <= params.bag_size as usize);
-            // The answer is at the likeliest, or at the mean of those near it.
+            // The answer is the likeliest particle, or the mean of the particles near it.
             let best = seen.particles.iter().max_by(|a, b| a.1.total_cmp(&b.1));
             let (area, _) = best.expect("there are particles");
             let off = area.center_distance(&estimate.target);

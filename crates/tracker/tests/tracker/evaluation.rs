@@ -8,14 +8,14 @@ use rand_chacha::ChaCha8Rng;
 
 const TOLERANCE: f64 = 1e-4;
 
-/// How the random vectors of a case relate to each other.
+/// How similar the random vectors of a case are to each other.
 #[derive(Debug, Clone, Copy)]
 enum Likeness {
-    /// Nothing in common.
+    /// Independent vectors.
     Unrelated,
-    /// One pattern and noise of this size, as patches of a video are.
+    /// A common pattern with noise of this size, like patches of a video.
     Noisy(f32),
-    /// One pattern and multiples of one other, clamped: nearly dependent.
+    /// A common pattern plus multiples of a second one, clamped: nearly linearly dependent.
     Dependent,
 }
 
@@ -164,7 +164,8 @@ fn the_paper_setting_agrees_closely() {
     }
 }
 
-/// What of a candidate is not in the span of the history is what its own direction is made of, however small it is.
+/// The part of a candidate outside the span of the history gives the candidate's own basis direction, however small
+/// that part is.
 #[test]
 fn candidates_nearly_in_the_span_of_the_history_agree() {
     let params = Preset::Paper.params();

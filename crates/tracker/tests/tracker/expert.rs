@@ -1,14 +1,15 @@
-//! The second opinion of an expert beside the filter.
+//! A tracker with an expert beside its particle filter.
 
 use std::sync::{Arc, Mutex};
 
 use bagtrack_testing::scene::{flat, frame, panned, params, robust, target};
 use bagtrack_tracker::{Expert, Frame, InDoubt, Rect, Sighting, Status, Tracker, TrackerError};
 
-/// Says what it was told to say of the target's place, with the number of the frame in its template.
+/// An expert that answers with prescribed boxes and scores for each frame.
 #[derive(Debug)]
 struct Oracle {
-    /// Where it sees the target in a frame, and how sure it is; none for where it is now.
+    /// The box and the score that it answers for each frame; with `None` it answers with the place where it was asked
+    /// to look, and 0.9.
     says: fn(usize) -> Option<(Rect, f32)>,
     /// The number of the next frame, and the places where it was asked to look.
     asked: Mutex<(usize, Vec<Rect>)>,
@@ -24,7 +25,7 @@ impl Oracle {
         })
     }
 
-    /// What it says from now on it says of frame `number`.
+    /// From now on it answers for frame `number`.
     fn at(&self, number: usize) {
         self.asked.lock().unwrap().0 = number;
     }
@@ -85,8 +86,8 @@ fn an_expert_that_agrees_changes_little_and_makes_the_score_sure() {
     }
 }
 
-/// The picture is blank, so the filter finds nothing after a while: then the answer is the expert's, and after some
-/// frames the filter goes on from there.
+/// In blank frames the filter finds nothing: the answer is then the expert's, and after some frames the filter goes on
+/// from the expert's place.
 #[test]
 fn where_the_filter_doubts_the_answer_is_the_experts_and_then_the_filter_follows() {
     let expert = Oracle::new(|t| Some((target(if t < 70 { t } else { 5 }), 0.9)));
@@ -112,7 +113,7 @@ fn where_the_filter_doubts_the_answer_is_the_experts_and_then_the_filter_follows
         }
     }
     assert!(doubted > 10, "{doubted}");
-    // The target is there again where the expert saw it, too far away for the filter alone.
+    // The target is visible again where the expert saw it, too far away for the filter alone.
     let found = both.step(&shown(5)).unwrap();
     let missed = alone.step(&shown(5)).unwrap();
     assert!(found.target.overlap(&target(5)) > 0.6, "{found:?}");
@@ -162,7 +163,7 @@ fn an_expert_for_doubt_is_asked_there_alone_and_looks_where_the_filter_was_last(
         if is_asked {
             continue;
         }
-        // Until it is first asked the two are the same.
+        // Until the expert is first asked, both trackers give the same answers.
         let by_itself = alone.step(&picture).unwrap();
         is_asked = by_itself.score < 0.95;
         assert_eq!(looks() - before, usize::from(is_asked), "frame {t}");
@@ -178,7 +179,8 @@ fn an_expert_for_doubt_is_asked_there_alone_and_looks_where_the_filter_was_last(
     }
     assert!(unasked > 5 && is_asked, "{unasked}");
     assert!(looks() - at_first < 60 - unasked, "{}", looks());
-    // What was begun in doubt goes on in doubt: the boxes of the other are others.
+    // A session with an expert that is asked only in doubt cannot go on with one that is always asked: the boxes would
+    // differ.
     let bytes = both.snapshot();
     let always: Arc<dyn Expert> = expert.clone();
     let refused = Tracker::restore_beside(&bytes, Some(always)).unwrap_err();
@@ -232,7 +234,8 @@ fn a_session_goes_on_from_its_snapshot_with_the_same_expert_alone() {
     }
 }
 
-/// Whoever can change the bytes can change the checksum.
+/// Snapshots with impossible values of the expert and a right checksum: whoever can change the bytes can change the
+/// checksum, too.
 #[test]
 fn a_second_opinion_that_cannot_be_is_refused() {
     let expert = Oracle::new(|t| Some((target(t), 0.8)));
@@ -271,7 +274,7 @@ fn a_session_without_an_expert_takes_none_from_its_snapshot_on() {
         alone.step(&frame(1)).unwrap()
     );
     assert!(restored.snapshot() == alone.snapshot());
-    // A score that is no probability weighs nothing.
+    // The score of the preset `paper` is no probability, so it cannot be weighed against the expert's.
     let paper = Tracker::beside(&frame(0), target(0), params(1), Some(expert)).unwrap_err();
     assert!(matches!(paper, TrackerError::Expert(_)), "{paper:?}");
 }

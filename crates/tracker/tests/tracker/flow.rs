@@ -26,8 +26,8 @@ fn frames_are_counted_and_the_first_answer_is_the_box_given() {
 
 #[test]
 fn a_target_unlike_its_surroundings_is_followed() {
-    // With one previous patch: with five, the printed distance of origins favours what makes up for the difference
-    // of the last patches to the bag, and drifts off even this scene.
+    // With one previous patch. With five, the printed distance of origins favours candidates that make up for the
+    // difference between the last patches and the bag, and the box drifts off even in this scene.
     for seed in 0..5 {
         let params = Params {
             history: 1,
@@ -44,15 +44,15 @@ fn a_target_unlike_its_surroundings_is_followed() {
     }
 }
 
-/// Candidates are diagonalised side by side: once those that another session had left beyond a stage's own changed
-/// bits.
+/// Candidates are diagonalised side by side in buffers of the thread. What another session left there beyond this
+/// session's candidates must not change a bit.
 #[test]
 fn a_printed_search_in_two_stages_does_not_depend_on_what_the_thread_saw_before() {
     let params = Params {
         particles: 7,
         history: 9,
         search: Search::Answer,
-        // Small enough that the last bits of a distance are seen in the weights.
+        // Small enough that the last bits of a distance show in the weights.
         sigma: 0.0001,
         ..params(0)
     };
@@ -68,7 +68,8 @@ fn a_printed_search_in_two_stages_does_not_depend_on_what_the_thread_saw_before(
     }
 }
 
-/// A small striped target, red and blue, that turns by a degree a frame and goes right, before grains of all colours.
+/// A small target with red and blue stripes, which turns by one degree a frame and moves right, before a background of
+/// grains of all colours.
 fn turning(t: usize) -> Frame {
     let (x, y) = turning_target(t).center();
     let (sin, cos) = (t as f64).to_radians().sin_cos();
@@ -95,8 +96,8 @@ fn turning_target(t: usize) -> Rect {
     Rect::new(60.0 + t as f64, 70.0, 34.0, 28.0)
 }
 
-/// A turned target is looked at in a view of a part of the frame: once what another session had left around that part
-/// changed bits.
+/// A turned target is evaluated in a view of a part of the frame, which is made in a buffer of the thread. What another
+/// session left around that part must not change a bit.
 #[test]
 fn a_turned_target_does_not_depend_on_what_the_thread_saw_before() {
     let run = || {
@@ -147,7 +148,7 @@ fn a_frame_of_another_size_changes_nothing() {
 
 #[test]
 fn a_corrected_box_counts_as_a_frame_and_is_followed_from_there() {
-    // With one previous patch: five drift off this scene.
+    // With one previous patch: with five the box drifts off in this scene.
     let params = Params {
         history: 1,
         ..params(5)
@@ -180,7 +181,8 @@ fn a_corrected_box_counts_as_a_frame_and_is_followed_from_there() {
 
 #[test]
 fn boxes_are_in_the_pixels_of_the_upload() {
-    // The same scene, four times as large: the working image is the same, so are the answers, four times as large.
+    // The same scene in four times the size: the working image is the same, so the answers are the same boxes, four
+    // times as large.
     let large = |t: usize| {
         let small = frame(t);
         let wide = 480;
@@ -204,7 +206,7 @@ fn boxes_are_in_the_pixels_of_the_upload() {
     }
 }
 
-/// The preset `robust` with one parameter of the table set otherwise.
+/// The preset `robust` with one parameter of the table set to `value`; `None` where its type cannot hold the value.
 fn with(name: &str, value: f64) -> Option<Params> {
     let mut fields = serde_json::to_value(Preset::Robust.params()).expect("plain numbers");
     let is_whole = fields[name].is_u64();
@@ -228,7 +230,7 @@ fn every_parameter_of_the_table_is_held_to_its_range() {
         let step = if row.kind == "u32" { 1.0 } else { 1e-9 };
         for value in [min, max] {
             let params = with(row.name, value).expect("an end of the range");
-            // What is in its range may still cost too much together with the others.
+            // A value in its range may still exceed a limit on products of parameters.
             if let Err(error) = params.validate() {
                 assert!(error.expected.contains("times"), "{error}");
             }
@@ -251,7 +253,8 @@ fn every_parameter_of_the_table_is_held_to_its_range() {
     }
 }
 
-/// Each size in its range, but not together: a frame would take seconds, a session a hundred megabytes.
+/// Each size is in its range, but their product is too large: a frame would take seconds, or a session a hundred
+/// megabytes.
 #[test]
 fn sizes_that_cost_too_much_together_are_named() {
     type Change = fn(&mut Params);

@@ -1,4 +1,4 @@
-//! Where the box of a lost target goes: along with the camera while it is hidden.
+//! While a target is hidden, its box moves with the camera's view of the background.
 
 use bagtrack_testing::scene::robust;
 use bagtrack_tracker::{Estimate, Frame, Rect, Status, Tracker};
@@ -14,14 +14,14 @@ fn noise(x: usize, y: usize, seed: u32) -> f64 {
     f64::from((cell ^ seed).wrapping_mul(2_654_435_761) >> 24)
 }
 
-/// What is behind the target, at a place of the world.
+/// The background's luma at a place of the world.
 fn hills(x: f64, y: f64) -> f64 {
     let waves = (x * 0.13).sin() + (x * 0.041).cos() + (y * 0.11).sin() + (y * 0.053).cos();
     60.0 + 14.0 * waves + noise((x + 90.0) as usize, (y + 90.0) as usize, 9) / 8.0
 }
 
-/// A frame seen by a camera that is `camera` pixels further left, and the target's box in it. The target is hidden
-/// where it is not shown.
+/// The frame of a camera that has moved `camera` pixels to the left, and the target's box in it. The target is drawn
+/// only if `is_shown`.
 fn scene(at: (usize, usize), camera: usize, is_shown: bool) -> (Frame, Rect) {
     let (left, top) = (at.0 + camera, at.1);
     let luma = (0..WIDTH * HEIGHT).map(|i| {
@@ -40,7 +40,7 @@ fn scene(at: (usize, usize), camera: usize, is_shown: bool) -> (Frame, Rect) {
     )
 }
 
-/// A target that walks to the right for 30 frames, upright; the tracker that has followed it.
+/// The tracker after 30 frames in which it has followed a target that moves right.
 fn followed(seed: u64) -> Tracker {
     let (first, given) = scene((30, 60), 0, true);
     let mut tracker = Tracker::new(&first, given, robust(seed)).expect("a box inside the frame");
@@ -61,7 +61,7 @@ fn the_box_of_a_hidden_target_moves_with_the_camera() {
         let mut tracker = followed(seed);
         let mut offset = None;
         for t in 1..=20 {
-            // Where the target was, in a picture that the camera moves by 4 pixels a frame.
+            // The target's last place, in the picture of a camera that moves by 4 pixels a frame.
             let (frame, place) = scene((60, 60), 4 * t, false);
             let answer = step(&mut tracker, &frame);
             lost += u32::from(answer.status == Status::Lost);

@@ -1,15 +1,15 @@
-//! What a session keeps between frames, counted by the allocator.
+//! The memory that a session keeps between frames, counted by the allocator.
 
 use bagtrack_testing::scene::{panned, robust};
 use bagtrack_tracker::{Params, Preset, Tracker};
 
-/// What dropping `tracker` gives back, in bytes.
+/// The bytes of heap memory that dropping `tracker` frees.
 fn heap(tracker: Tracker) -> usize {
     let counted = allocation_counter::measure(|| drop(tracker));
     usize::try_from(-counted.bytes_current).expect("dropping gives back")
 }
 
-/// After `steps` frames: enough to fill the bag, with refreshes of the background.
+/// A tracker after `steps` frames; 75 fill the bag, and renew the background samples several times.
 fn session(params: Params, steps: usize) -> Tracker {
     let (frame, target) = panned(0, (0, 0));
     let mut tracker = Tracker::new(&frame, target, params).expect("a box inside the frame");
@@ -28,7 +28,7 @@ fn session(params: Params, steps: usize) -> Tracker {
 fn a_session_keeps_no_more_than_a_quarter_of_a_mebibyte_and_no_snapshot_asks_for_more() {
     const LIMIT: usize = 256 * 1024;
     for params in [Preset::Paper.params(), robust(0)] {
-        // The thread's room for calculations is no part of a session.
+        // Makes the thread's own buffers first: they are no part of a session.
         drop(session(params.clone(), 2));
         for steps in [0, 75] {
             let tracker = session(params.clone(), steps);
@@ -49,7 +49,8 @@ fn a_session_keeps_no_more_than_a_quarter_of_a_mebibyte_and_no_snapshot_asks_for
         }
     }
 
-    // Lengths that promise more than there is: whatever byte they are written over.
+    // Writes a huge length over the snapshot at many places: restoring must not allocate for lengths that the bytes do
+    // not hold.
     let body = session(robust(0), 1).snapshot();
     let mut most = 0;
     let endless = [0xff, 0xff, 0xff, 0xff, 0x0f];

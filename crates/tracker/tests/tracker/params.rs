@@ -1,9 +1,9 @@
-//! Any valid parameters on any small frames: a finite answer, the same from every copy of the state.
+//! Any valid parameters on any small frames give finite answers, which are the same from every copy of the state.
 
 use bagtrack_tracker::{Features, Frame, Params, Preset, Rect, Search, Tracker};
 use proptest::prelude::*;
 
-/// Numbers in [0, 1], the ends and what underflows among them.
+/// Numbers in [0, 1], among them the ends, and numbers whose products underflow.
 fn shares() -> impl Strategy<Value = Vec<f64>> {
     let share = prop_oneof![
         2 => Just(0.0),
@@ -15,7 +15,7 @@ fn shares() -> impl Strategy<Value = Vec<f64>> {
     proptest::collection::vec(share, 34)
 }
 
-/// The parameters that `shares` make over the whole of the ranges, but for sizes: those stay small, to be quick.
+/// Parameters from anywhere in their ranges, at the given shares of each; sizes stay small, to be quick.
 fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
     let mut shares = shares.iter().copied();
     let mut share = || shares.next().expect("as many shares as parameters");
@@ -32,7 +32,7 @@ fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
         ..bagtrack_testing::scene::robust(seed)
     };
     let on = |bit: u8| switches & 1 << bit != 0;
-    // Ranges over many magnitudes.
+    // For ranges that span orders of magnitude: the share is taken of the logarithm.
     let mut magnitude = |from: f64, to: f64| {
         (from.ln() + share() * (to / from).ln())
             .exp()
@@ -72,7 +72,7 @@ fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
     }
 }
 
-/// A frame of `luma`, shifted by some pixels a frame and now and then black: motion, a camera, and the dark.
+/// Frame `t`: `luma` as a pattern that shifts from frame to frame, and every fifth frame black.
 fn moving(t: usize, width: u32, height: u32, luma: &[u8]) -> Frame {
     let gray = |i: usize| {
         if t % 5 == 3 {
@@ -105,7 +105,7 @@ proptest! {
         let Ok(mut tracker) = Tracker::new(&frame(0), target, params.clone()) else {
             return Ok(());
         };
-        // Another session of the same parameters on the same thread must leave no trace.
+        // Another session with the same parameters on the same thread must not influence this one.
         let other = Tracker::new(&bagtrack_testing::scene::frame(0), bagtrack_testing::scene::target(0), params);
         let mut other = other.expect("a box inside the frame");
         for t in 1..8 {
@@ -127,7 +127,7 @@ proptest! {
     }
 }
 
-/// Particles that are drawn from the last ones were weighed by the colours around another session's target.
+/// Resampled particles are weighed by the colours around the target: those of another session's target must not count.
 #[test]
 fn a_session_gives_the_same_answers_after_any_other_on_its_thread() {
     let resampled = Params {
@@ -144,7 +144,7 @@ fn a_session_gives_the_same_answers_after_any_other_on_its_thread() {
             .collect::<Vec<_>>()
     };
     let alone = std::thread::spawn(answers.clone()).join().unwrap();
-    // One that looks for its answer in a frame of noise.
+    // The other session looks for its target in frames of noise.
     let noise: Vec<u8> = (0..64 * 64_u32)
         .map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8)
         .collect();

@@ -1,4 +1,4 @@
-//! Boxes against each other, by hand.
+//! Distances and overlaps of boxes, against values computed by hand.
 
 use bagtrack_tracker::Rect;
 
@@ -17,10 +17,10 @@ fn the_center_distance_is_that_of_the_centres() {
 fn the_overlap_is_intersection_over_union() {
     let square = Rect::new(0.0, 0.0, 10.0, 10.0);
     assert_eq!(square.overlap(&square), 1.0);
-    // 50 shared of 100 + 100 - 50.
+    // The intersection is 50, the union 100 + 100 - 50.
     let beside = Rect::new(5.0, 0.0, 10.0, 10.0);
     assert_eq!(square.overlap(&beside), 50.0 / 150.0);
-    // One inside the other: 25 of 100.
+    // One box inside the other: 25 of 100.
     assert_eq!(square.overlap(&Rect::new(1.0, 1.0, 5.0, 5.0)), 0.25);
     assert_eq!(square.overlap(&Rect::new(10.0, 0.0, 10.0, 10.0)), 0.0);
     assert_eq!(square.overlap(&Rect::new(40.0, 40.0, 10.0, 10.0)), 0.0);

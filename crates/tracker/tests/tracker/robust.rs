@@ -1,4 +1,4 @@
-//! What the default parameters promise: the target is held, also when the camera swings, and after a correction.
+//! The default parameters hold the target, also when the camera swings, and after a correction.
 
 use bagtrack_testing::scene::{frame, leaping, near, panned, receding, robust, target, tilting};
 use bagtrack_tracker::{Frame, Params, Preset, Rect, Tracker};
@@ -46,7 +46,7 @@ fn a_target_that_shrinks_while_its_background_grows_keeps_its_box() {
     }
 }
 
-/// In pixels of 1 x 1, 2 x 2 and 4 x 4: cells have six of them along a side.
+/// The three targets are tracked in working pixels of 1 x 1, 2 x 2 and 4 x 4 pixels of the frame.
 #[test]
 fn a_target_is_held_as_well_when_it_is_large() {
     for (width, height) in [(60, 50), (110, 96), (200, 170)] {
@@ -69,7 +69,7 @@ fn a_target_that_leaps_by_its_own_length_is_held() {
 
 #[test]
 fn without_a_look_at_every_place_the_leaps_lose_the_target() {
-    // So that the scene above tests what it says.
+    // Shows that the test above depends on the search at every place.
     let params = Params {
         dense_maxima: 0,
         ..robust(0)
@@ -85,8 +85,8 @@ fn without_a_look_at_every_place_the_leaps_lose_the_target() {
     assert!(held < 45, "{held}");
 }
 
-/// The mean distance of the answers from the target's centre in the last frames of `tilting`, in pixels that are so
-/// many times as large.
+/// The mean distance of the answers from the target's centre in the last frames of `tilting`, in units of `zoom`
+/// pixels.
 fn off_when_tilted(params: Params, zoom: usize) -> f64 {
     let (first, given) = tilting(0, zoom);
     let mut tracker = Tracker::new(&first, given, params).expect("a box inside the frame");
@@ -107,7 +107,7 @@ fn a_head_that_tilts_stays_in_the_middle_of_its_box() {
     }
 }
 
-/// The mean overlap while the camera swings back and forth, in a single frame, along x and y at once.
+/// The mean overlap while the camera swings back and forth; each swing takes a single frame, along x and y at once.
 fn overlap_through_swings(params: Params) -> f64 {
     let camera = |t: usize| {
         if (t / 12).is_multiple_of(2) {
@@ -161,7 +161,7 @@ fn the_same_target_is_followed_after_a_correction() {
         for t in 1..30 {
             tracker.step(&frame(t)).expect("frames of one size");
         }
-        // A cut: the target is elsewhere.
+        // After a cut the target is elsewhere, so the box is corrected.
         let corrected = tracker.retarget(&frame(110), target(110));
         let corrected = corrected.expect("a box inside the frame");
         assert_eq!((corrected.frame, corrected.target), (30, target(110)));

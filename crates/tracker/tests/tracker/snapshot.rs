@@ -1,10 +1,10 @@
-//! Snapshots: a restored tracker goes on bit for bit, and no bytes can harm the program.
+//! Snapshots: a restored tracker goes on bit for bit, and no bytes make the program fail.
 
 use bagtrack_testing::scene::{frame, params, robust, target};
 use bagtrack_tracker::{Frame, Params, Tracker, TrackerError};
 use proptest::prelude::*;
 
-/// A session of some frames, with vectors short enough that random damage hits everything.
+/// A session of `steps` frames, with vectors so short that random damage hits all parts of the snapshot.
 fn session(steps: usize, params: Params) -> Tracker {
     let params = Params {
         particles: 6,
@@ -23,7 +23,7 @@ fn session(steps: usize, params: Params) -> Tracker {
     tracker
 }
 
-/// The same with the extensions.
+/// As [`session`], with the extensions of the preset `robust`.
 fn extended(steps: usize) -> Tracker {
     let params = Params {
         background_samples: 5,
@@ -32,7 +32,7 @@ fn extended(steps: usize) -> Tracker {
     session(steps, params)
 }
 
-/// `body` with the header that makes it look like a snapshot.
+/// `body` with the header of a snapshot and a right checksum.
 fn sealed(body: &[u8]) -> Vec<u8> {
     let mut bytes = session(0, params(11)).snapshot();
     bytes.truncate(12);
@@ -41,14 +41,14 @@ fn sealed(body: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// What [`sealed`] seals.
+/// The body of the tracker's snapshot, without header and checksum.
 fn body(tracker: &Tracker) -> Vec<u8> {
     let snapshot = tracker.snapshot();
     assert_eq!(sealed(&snapshot[16..]), snapshot);
     snapshot[16..].to_vec()
 }
 
-/// Steps `tracker` and a copy that went through a snapshot alike, corrects both, and compares every bit.
+/// Steps `tracker` and a copy restored from its snapshot, corrects both, and compares every bit.
 fn goes_on_bit_for_bit(tracker: &mut Tracker, from: usize) {
     let bytes = tracker.snapshot();
     assert!(bytes.len() <= 512 * 1024, "{} bytes", bytes.len());
@@ -68,7 +68,7 @@ fn goes_on_bit_for_bit(tracker: &mut Tracker, from: usize) {
     assert!(restored.snapshot() == tracker.snapshot());
 }
 
-/// Over new samples of the background, which come every tenth frame, and new entries of the bag.
+/// The frames go past a renewal of the background samples (every tenth frame) and past new entries of the bag.
 #[test]
 fn a_tracker_restored_near_another_goes_on_bit_for_bit() {
     for params in [params(9), robust(9)] {
@@ -88,7 +88,7 @@ fn a_tracker_restored_near_another_goes_on_bit_for_bit() {
             }
             assert!(restored.snapshot() == expected.snapshot(), "{t}");
         }
-        // One of other parameters shares nothing.
+        // A tracker with other parameters has nothing to share.
         let other = extended(3).restore_near(&tracker.snapshot(), None);
         let mut other = other.expect("an own snapshot");
         assert_eq!(other.step(&frame(25)), tracker.step(&frame(25)));
@@ -100,7 +100,8 @@ fn a_restored_tracker_goes_on_bit_for_bit() {
     for params in [params(9), robust(9)] {
         let mut tracker =
             Tracker::new(&frame(0), target(0), params).expect("a box inside the frame");
-        // Before, at and after updates of the bag (every 5th frame) and refreshes of the background (every 10th).
+        // Snapshots before, at and after updates of the bag (every 5th frame) and renewals of the background samples
+        // (every 10th).
         for t in 0..=71 {
             if t > 0 {
                 tracker
@@ -112,7 +113,7 @@ fn a_restored_tracker_goes_on_bit_for_bit() {
             }
         }
         println!("{} bytes", tracker.snapshot().len());
-        // Also from a correction on, which the last call ends with.
+        // Also after a correction, with which each call ends.
         goes_on_bit_for_bit(&mut tracker, 71);
         goes_on_bit_for_bit(&mut tracker, 86);
     }
@@ -149,7 +150,8 @@ fn another_version_is_named() {
     assert_eq!(error.to_string(), "the snapshot is of another version");
 }
 
-/// What is accepted must go on: every answer finite, every snapshot acceptable again.
+/// If the bytes are accepted, the tracker must go on: every answer is finite, and every further snapshot can be
+/// restored.
 fn must_go_on(bytes: &[u8]) {
     let Ok(mut tracker) = Tracker::restore(bytes) else {
         return;
@@ -169,7 +171,7 @@ fn must_go_on(bytes: &[u8]) {
     }
 }
 
-/// Numbers that calculations do not like.
+/// Values that are likely to upset calculations.
 const HOSTILE: [f32; 12] = [
     f32::NAN,
     f32::INFINITY,
@@ -196,7 +198,8 @@ proptest! {
         for tracker in [session(5, params(11)), extended(5)] {
             let mut body = body(&tracker);
             for (index, value) in &changes {
-                // The parameters, sizes and numbers come first; the vectors would drown them.
+                // Half of the damage goes into the first 400 bytes, with parameters and sizes: the vectors are so long
+                // that few hits would reach these otherwise.
                 let at = index.index(if early { 400 } else { body.len() });
                 body[at] = *value;
             }
@@ -211,7 +214,7 @@ proptest! {
     ) {
         let mut body = body(&extended(5));
         for (index, which) in changes {
-            // Colours, the small image and the running means come last.
+            // The last 1200 bytes hold the colours, the small image and the running means.
             let first = if late { body.len() - 1200 } else { 0 };
             let at = first + index.index(body.len() - 4 - first);
             body[at..at + 4].copy_from_slice(&HOSTILE[which].to_le_bytes());

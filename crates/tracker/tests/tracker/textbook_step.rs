@@ -1,12 +1,12 @@
-//! The printed `step` over time: each frame's weights and answer against the textbook version, which keeps a history
-//! and a bag of its own, and the next particles against the weights.
+//! The printed `step` over time: the weights and the answer of each frame against the textbook version, which keeps its
+//! own history and bag, and the next particles against the weights.
 
 use std::collections::VecDeque;
 
 use bagtrack_testing::scene::{frame, target};
 use bagtrack_tracker::{AffineSubspace, Frame, Params, Preset, Rect, Tracker, patch};
 
-/// What the textbook remembers of the frames before.
+/// The state of the textbook version between frames.
 struct Memory {
     params: Params,
     /// Newest first.
@@ -54,7 +54,7 @@ fn every_frame_has_the_textbook_weights_and_answer() {
         particles: 40,
         patch_width: 16,
         patch_height: 12,
-        // Full after ten frames.
+        // With three entries the bag is full after ten frames.
         bag_size: 3,
         ..Preset::Paper.params()
     };
@@ -80,7 +80,7 @@ fn every_frame_has_the_textbook_weights_and_answer() {
                 "frame {number}, particle {i}: {difference}"
             );
         }
-        // The first of those whose weights rounding cannot tell apart.
+        // The answer has the greatest weight; rounding may make another particle of nearly the same weight the answer.
         let greatest = textbook.weights.iter().copied().fold(0.0, f64::max);
         let chosen = boxes.iter().position(|area| *area == answer);
         let chosen = chosen.expect("the answer is a particle");
@@ -90,7 +90,8 @@ fn every_frame_has_the_textbook_weights_and_answer() {
     assert_eq!((memory.history.len(), memory.bag.len()), (5, 3));
 }
 
-/// How many standard errors of a mean over `count` draws the mean of `found` is away from that of `from`, by weight.
+/// The distance between the weighted means of `found` and `from`, in standard errors of a mean of as many draws from
+/// `from`, each with noise of the standard deviation `std` added.
 fn deviation(found: &[(f64, f64)], from: &[(f64, f64)], std: f64) -> f64 {
     let mean = |cloud: &[(f64, f64)]| cloud.iter().map(|(x, w)| x * w).sum::<f64>();
     let middle = mean(from);
@@ -127,7 +128,7 @@ fn the_next_particles_are_drawn_by_the_weights() {
         let equal: Vec<(f64, f64)> = before.iter().map(|&(x, _)| (x, share)).collect();
         by_none += deviation(&after, &equal, std).powi(2);
     }
-    // Squares of standard normal numbers have the mean 1; that of forty is off by 0.22.
+    // The square of a standard normal number has the mean 1; the mean of forty squares has the standard error 0.22.
     let (by_weight, by_none) = (
         by_weight / frames.len() as f64,
         by_none / frames.len() as f64,
