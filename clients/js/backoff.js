@@ -17,10 +17,10 @@ export class Backoff {
    * @param {number} [asked] Milliseconds.
    */
   next(asked = 0) {
-    // Clients that were cut off together do not come back together.
+    // The random part keeps clients that were cut off together from coming back together.
     const pausing = Math.max(this.own * (0.5 + Math.random() / 2), asked);
     this.own = Math.min(2 * this.own, LONGEST);
-    // A longer one would end at once.
+    // A timer with a longer delay would fire at once.
     return Date.now() + pausing > this.late ? undefined : Math.min(pausing, LONGEST_TIMER);
   }
 }

@@ -22,7 +22,8 @@ export function pictureOf(bag) {
   return canvas.convertToBlob();
 }
 
-/** Draws a vector from its least value to its greatest; 0 is in the middle where there are values on both sides.
+/** Draws a vector in gray, from its least value (black) to its greatest (white). With values of both signs, 0 is
+ * mid-gray.
  * @param {OffscreenCanvasRenderingContext2D} context
  * @param {Float32Array} vector
  * @param {number} columns

@@ -1,4 +1,4 @@
-// A service: it opens sessions.
+// The client of a service, which opens sessions there.
 
 import { boxText, bytesOf, checkNumber, frameOf, snapshotBytes } from "./given.js";
 import { MOST_KEPT, restoring } from "./kept.js";
@@ -58,7 +58,7 @@ export class Client {
    */
   async open(frame, box, { preset, seed, parameters, signal } = {}) {
     const json = parameters && JSON.stringify(parameters);
-    // The same boxes come again only with the same seed.
+    // The client draws the seed, so that a session that is opened again gives the same boxes.
     const drawn = seed ?? crypto.getRandomValues(new Uint32Array(1))[0];
     const query = { box: boxText(box), preset, seed: drawn, parameters: json };
     return this.create({ query, body: await bytesOf(frameOf(frame)), type: "application/octet-stream", signal });
@@ -75,12 +75,12 @@ export class Client {
     if (patience !== undefined) checkNumber("patience", patience);
     const session = await this.create({ ...restoring(await snapshotBytes(snapshot)), signal, patience });
     try {
-      // What opens a session does not tell the score.
+      // The answer that opens a session has no score.
       const response = await this.transport.call("GET", `sessions/${session.id}`, { signal, patience });
       session.take((await documentOf(response, "answer")).answer);
       return session;
     } catch (error) {
-      // Nobody else knows its id.
+      // Nobody else knows the session's id, so nobody else would end it.
       session.end().catch(() => undefined);
       throw error;
     }
@@ -104,7 +104,7 @@ export class Client {
     const { id, frame, box } = await documentOf(response, "id", "frame", "box");
     const { query, body, type } = request;
     const origin = this.snapshotEvery > 0 ? { frame, request: { query, body, type } } : undefined;
-    // The box that is given holds.
+    // The answer to the first frame is the given box.
     const answer = /** @type {const} */ ({ frame, box, score: 1, status: "tracking" });
     return new Session(this, id, answer, response.headers, origin, true);
   }

@@ -1,4 +1,4 @@
-// What callers give: checked before anything of it is sent or kept.
+// Checks what callers give, before any of it is sent or kept.
 
 import { Problem } from "./problem.js";
 
@@ -13,7 +13,7 @@ const ELEMENTS = ["HTMLCanvasElement", "HTMLVideoElement", "HTMLImageElement"];
 const DRAWN = ["ImageBitmap", "VideoFrame", "OffscreenCanvas", ...ELEMENTS];
 const PIXELS = ["Uint8Array", "Uint8ClampedArray"];
 const FILES = ["Blob", "File"];
-/** Of a video whose picture is there: `HAVE_CURRENT_DATA`. */
+/** The least `readyState` of a video that has a picture to draw: `HAVE_CURRENT_DATA`. */
 const SHOWS = 2;
 
 /** Refuses what is no image for a tracker here.
@@ -31,7 +31,7 @@ export function checkImage(image) {
   throw unsupported("Pixels are bytes: each of data, luma, cb and cr is a Uint8Array or a Uint8ClampedArray.");
 }
 
-/** What to do with what is no image yet.
+/** Advice for a value from which an image could be made, such as a promise.
  * @param {unknown} image */
 function hint(image) {
   if (className(image) === "Promise") return " This is a promise: await it.";
@@ -56,7 +56,8 @@ function sidesOf(image) {
   return [image.width, image.height];
 }
 
-/** A copy of bytes, whose buffer their owner may fill with others afterwards, or the file; nothing where it is neither.
+/** A copy of the given bytes, since the caller may use their buffer again; or the file itself; `undefined` for all
+ * else.
  * @param {unknown} given
  * @returns {Blob | Uint8Array<ArrayBuffer> | undefined} */
 function ownOf(given) {

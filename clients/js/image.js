@@ -1,4 +1,4 @@
-// What a frame is given as, and its pixels.
+// The forms in which a frame may be given, and their pixels.
 
 import { checkImage, sizeOf, unsupported } from "./given.js";
 import { Problem } from "./problem.js";

@@ -15,17 +15,20 @@ import { close, sendable } from "./transfer.js";
  * @typedef {{resolve: (value: any) => void, reject: (problem: unknown) => void}} Waiting
  */
 
-/** Of all clients, and beyond the end of a thread: a session must not be taken for one of another thread. */
+/**
+ * The id of the newest session. It counts on over all clients and threads: no session is taken for one of another
+ * thread.
+ */
 let lastId = 0;
 
 const ENDED = { type: "session-not-found", status: 404, detail: "The session has ended." };
 
-/** Browsers do not tell why. */
+/** Browsers do not tell why a worker cannot be loaded; these are the usual reasons. */
 const NOT_LOADED =
   "The worker with the tracker cannot be loaded: its file is missing where the page looks for it, such as one that a " +
   "bundler has left out, or a content security policy refuses it.";
 
-/** Whether a call is of sessions that were opened before.
+/** Whether a call needs sessions that were opened before.
  * @param {string} name
  * @param {{ids?: number[]}} call */
 const isOfSessions = (name, { ids }) => name !== "open" && name !== "restore" && ids?.length !== 0;
@@ -112,7 +115,7 @@ export class LocalClient {
     const { lastProblem } = this;
     const sending = this.before.then(async () => {
       this.check(lastProblem);
-      // Another worker would be started in vain.
+      // A new worker would not have the session.
       if (!this.worker && isOfSessions(name, call)) throw new Problem(ENDED);
       const worker = await this.started();
       const { sent, handed } = (await taken) ?? { sent: undefined, handed: [] };
@@ -120,14 +123,14 @@ export class LocalClient {
       signal?.throwIfAborted();
       this.calls += 1;
       const number = this.calls;
-      // Fails with what cannot be copied; then nothing waits.
+      // Throws if a value cannot be copied to the worker; then no call waits for an answer.
       worker.postMessage({ number, name, call: taken ? { ...call, image: sent } : call }, handed);
       const answer = new Promise((resolve, reject) => this.waiting.set(number, { resolve, reject }));
       answer.catch(() => undefined);
       worker.ref?.();
       return { answer };
     });
-    // A call that could not be sent gives up what was made for it, and holds up none behind it.
+    // A call that could not be sent closes the image that was made for it, and does not block the calls after it.
     const givenUp = sending.catch(() => taken?.then(({ sent, handed }) => handed.length > 0 && close(sent)));
     this.before = givenUp.catch(() => undefined);
     return sending.then(({ answer }) => answer);
@@ -143,7 +146,7 @@ export class LocalClient {
   started() {
     if (this.worker) return this.worker;
     const worker = this.start((problem) => {
-      // One that was ended long ago takes nothing along.
+      // The end of an older worker must not end the calls of the present one.
       if (this.worker === worker) this.fail(problem);
     });
     this.worker = worker;
@@ -152,7 +155,7 @@ export class LocalClient {
 
   /** @param {(problem: Problem) => void} ends */
   async start(ends) {
-    // Bundlers know a worker by these very words.
+    // Bundlers recognise a worker by exactly this expression.
     const isBrowser = typeof Worker !== "undefined";
     const worker = isBrowser ? new Worker(new URL("./worker.js", import.meta.url), { type: "module" }) : await startThread();
     await new Promise((resolve, reject) => {
@@ -168,7 +171,7 @@ export class LocalClient {
       worker.addEventListener("error", (/** @type {ErrorEvent} */ { message }) =>
         fail(message || NOT_LOADED),
       );
-      // Node.js alone tells when a worker ends without an error.
+      // Only Node.js has an event for a worker that ends without an error.
       worker.addEventListener("exit", () => fail("The worker with the tracker has ended, and all sessions with it."));
     });
     return worker;
@@ -188,15 +191,15 @@ export class LocalClient {
       worker.terminate();
       ends(new Problem(problem));
     }
-    // A process may end that waits for nothing.
+    // A process of Node.js may end while no call waits for an answer.
     if (this.waiting.size === 0) worker.unref?.();
   }
 }
 
-/** A worker of Node.js that listens as one of a browser does. */
+/** Starts a worker of Node.js, and gives it the `addEventListener` of a browser's worker. */
 async function startThread() {
   const { Worker } = await ofNode("worker_threads");
-  // In other words than above, or a bundler adds the file once more, as it is.
+  // Not the expression above: a bundler would recognise it, and add the file once more.
   const here = import.meta.url;
   const worker = new Worker(new URL("worker.js", here));
   worker.addEventListener = (/** @type {string} */ kind, /** @type {(event: any) => void} */ listen) =>
@@ -292,7 +295,7 @@ export class LocalSession {
     try {
       await this.client.call("end", { id: this.id });
     } catch (error) {
-      // It has ended with the client.
+      // The session has ended with its client.
       if (!(error instanceof Problem && error.isGone)) throw error;
     }
   }

@@ -10,12 +10,13 @@ let loading;
 /** Loads the module. Everything of `wasm/bagtrack_wasm.js` needs it. */
 export function load() {
   loading ??= read().then((source) => init({ module_or_path: source })).catch(refuse);
-  // One that could not be loaded is asked for again.
+  // After a failure the next call loads the module again.
   loading.catch(() => (loading = undefined));
   return loading;
 }
 
-/** Says what could not be loaded: browsers say no more than that a fetch has failed, or that a page is no module.
+/** Throws a problem that names the module's address: browsers say only that a fetch failed, or that a page is no
+ * module.
  * @param {Error} error
  * @returns {never} */
 function refuse(error) {
@@ -25,12 +26,12 @@ function refuse(error) {
   throw problem;
 }
 
-// Bundlers know the module by these very words.
+// Bundlers recognise the module by exactly this expression.
 const address = () => new URL("./wasm/bagtrack_wasm_bg.wasm", import.meta.url);
 
 async function read() {
   const url = address();
   if (url.protocol !== "file:") return url;
-  // Node.js does not fetch files.
+  // The `fetch` of Node.js takes no addresses of files.
   return (await ofNode("fs/promises")).readFile(url);
 }

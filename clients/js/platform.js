@@ -1,4 +1,4 @@
-// What only Node.js has.
+// Access to the modules of Node.js.
 
 /** A module of Node.js, for which no bundler shall look.
  * @param {string} name

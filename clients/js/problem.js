@@ -1,4 +1,4 @@
-// What can go wrong.
+// The error that calls of this client throw.
 
 /** Statuses with which the same request may succeed later: of the service, and of proxies before it. */
 const LATER = new Set([408, 429, 502, 503, 504]);

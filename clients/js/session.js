@@ -37,9 +37,9 @@ import { documentOf, pause, snapshotOf } from "./transport.js";
  * @property {AbortSignal} [signal]
  */
 
-/** A service that is about to end may be the only one for a while: milliseconds until the next try to go elsewhere. */
+/** Milliseconds between tries to leave a service that is about to end, which may be the only one for a while. */
 const MOVE_EVERY = 1000;
-/** What is read of an answer to a frame. */
+/** The members that an answer to a frame must have. */
 const ANSWER = ["frame", "box"];
 
 export class Session {
@@ -171,16 +171,16 @@ export class Session {
 
   /** Ends the session, and its stream. */
   async end() {
-    // The service tells a stream only with its next frame, and without one its line would stay.
+    // The service closes the stream of an ended session only at its next frame; without one, the line would stay open.
     this.open?.close();
     this.kept = new Kept();
     this.isEnded = true;
-    // What is still read would be missed after the end, and a page's console would say so.
+    // Reads under way would fail with 404 after the end, which a page's console would show.
     await Promise.allSettled(this.reading);
     try {
       await this.call("DELETE", "");
     } catch (error) {
-      // It has ended: by itself, or with an answer that got lost.
+      // The session has expired, or the answer to an earlier try to end it got lost.
       if (!(error instanceof Problem && (error.status === 404 || error.status === 410))) throw error;
     }
   }
@@ -210,7 +210,7 @@ export class Session {
    * @param {AbortSignal} [signal]
    */
   post(method, path, query, body, signal) {
-    // A form makes its own type, with the boundary in it.
+    // `fetch` sets the type of a form, with the boundary in it.
     const type = body instanceof FormData ? undefined : "application/octet-stream";
     return this.call(method, `/${path}`, { query, body, type, signal });
   }
@@ -238,11 +238,11 @@ export class Session {
 
   /** @param {Sent} sent */
   async send({ frames: given, box, make, signal }) {
-    // Only now, since many may wait, and are files.
+    // Files are read only now: many calls may wait, and their frames need not be in memory.
     const frames = await Promise.all(given.map(bytesOf));
     signal?.throwIfAborted();
     const number = (this.kept.last ?? this.frame) + 1;
-    // From here on they count: without an answer they are sent again before the next ones.
+    // From here on the frames count: without an answer they are sent again before the next ones.
     frames.forEach((frame, index) => this.kept.put({ number: number + index, frame, box }));
     try {
       const response = await this.deliver(number, (at) => make(at, frames), signal);
@@ -262,7 +262,7 @@ export class Session {
   /** Makes sure, after an answer, that the session can go on elsewhere.
    * @param {string | null} stored The last frame that a store has. */
   async checkpoint(stored) {
-    // With a store, any replica has the session up to there.
+    // With a store, any replica can go on from that frame.
     if (stored !== null) this.kept.forgetUntil(Number(stored));
     else if (this.isDraining && Date.now() - this.triedToMove >= MOVE_EVERY) await this.move();
     else if (this.isSnapshotDue) await this.renewOrigin();
@@ -319,7 +319,7 @@ export class Session {
         return await call(number);
       } catch (error) {
         const next = this.recovery(error, number);
-        // Where every replica loses the session again, this ends with the time for retries.
+        // If every replica loses the session again, this loop ends with the time for retries.
         const pausing = tries === 0 ? 0 : backoff.next();
         if (pausing === undefined) throw error;
         if (pausing > 0) await pause(pausing, signal);
@@ -338,7 +338,7 @@ export class Session {
     if (!kept) throw new Error(`The service needs frame ${number} again, which is not kept any more.`);
     const { frame, box } = kept;
     const sent = box ? this.put(number, frame, box, signal) : this.post("POST", "frames", { frame: number }, frame, signal);
-    // A page of a proxy does not say that the service has it.
+    // A proxy's page in place of an answer does not mean that the service has the frame.
     await documentOf(await sent, ...ANSWER);
     this.lastAcknowledged = number;
   }
@@ -356,9 +356,10 @@ export class Session {
     if (isGone) return undefined;
     if (expectedFrame === undefined) throw error;
     const sent = this.lastAcknowledged + 1;
-    // One that is not kept: a copy of the session older than its origin, such as another replica has.
+    // The service needs an older frame. If that is not kept, the service has a copy of the session from before its
+    // origin, as another replica may.
     if (expectedFrame < sent) return this.kept.find(expectedFrame) ? expectedFrame : undefined;
-    // The service has frames already that were sent again, the caller's perhaps among them.
+    // The service already has frames that are sent again here, perhaps those of the call, too.
     if (sent < expectedFrame && sent < number) return Math.min(expectedFrame, number);
     throw error;
   }
@@ -377,7 +378,7 @@ export class Session {
       [this.id, this.isDraining] = [opened.id, opened.isDraining];
       return opened.frame;
     } catch (error) {
-      // Such as a service with other keys, which does not take the snapshot.
+      // The session cannot be opened again, such as by a service with other keys, which refuses the snapshot.
       if (!(error instanceof Problem) || error.isTemporary) throw error;
       lost.cause = error;
       throw lost;

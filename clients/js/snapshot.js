@@ -1,16 +1,16 @@
-// Snapshots of the service: what a tracker of ours needs of them.
+// Takes the tracker's own snapshot out of a snapshot of the service.
 //
-// A snapshot of the service is, after its magic, a byte with the version, the length of the content (32 bits), the content
-// in DEFLATE, and a code that the service alone can check. The content begins with the tracker's own snapshot and its
-// length. The tracker checks all of that by itself, so nothing is lost where the code is not read.
+// A snapshot of the service is, after its magic, a byte with the version, the length of the content (32 bits), the
+// content in DEFLATE, and a code that the service alone can check. The content begins with the tracker's own snapshot
+// and its length. The tracker checks its own snapshot, so the code need not be checked here.
 
 import { Problem } from "./problem.js";
 
 const MAGIC = [0x89, ...new TextEncoder().encode("bagtrack\r\n")];
 const CODE_BYTES = 32;
-/** Of a session with one target. */
+/** The version of snapshots of sessions with one target. */
 const VERSION = 4;
-/** No tracker has more. */
+/** The most bytes of the content of a snapshot. */
 const MOST_BYTES = 16 << 20;
 
 /** @param {string} detail */
@@ -44,7 +44,7 @@ async function inflated(compressed, length) {
   for (const reader = stream.getReader(); ; ) {
     const { value, done } = await reader.read();
     if (done) break;
-    // Fails where there is more than was said.
+    // Throws if there is more content than the length says.
     content.set(value, at);
     at += value.length;
   }

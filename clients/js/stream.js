@@ -35,14 +35,16 @@ import { documentOf, longest, pause } from "./transport.js";
 
 const FIRST_PAUSE = 200;
 const LONGEST_PAUSE = 5000;
-/** A service that answers, but gives no stream so many times in a row, gives none. */
+/**
+ * After so many failures in a row to open a stream or to keep a session, though the service answers, the stream ends.
+ */
 const MOST_TRIES = 8;
-/** Close codes from here on are this and an HTTP status: the service closed the stream for good. */
+/** Close codes above this are the sum of this and an HTTP status: the service closed the stream for good. */
 const OF_STATUS = 4000;
 const UNAUTHORIZED = 401;
-/** As browsers call a line that broke. */
+/** The close code that browsers give for a line that broke. */
 const ABNORMAL = 1006;
-/** The status with which a stream begins. */
+/** The HTTP status of the handshake of a stream. */
 const SWITCHED = 101;
 
 const NO_SOCKET = "its stream cannot be opened: a proxy may let no WebSocket through.";
@@ -51,18 +53,18 @@ const LOSES = "it loses each session at once: a balancer may send requests to se
 /** @param {string} why */
 const noStream = (why) => new Problem({ type: "no-stream", detail: `The service answers, but ${why}` });
 
-/** The frame of what was sent, which was read before.
+/** The bytes of a frame that was sent: a file is read before it is sent.
  * @param {Waiting} sent */
 const sentFrame = ({ frame }) => /** @type {Uint8Array<ArrayBuffer>} */ (frame);
 
-/** What the service says; a problem where it is none of its messages.
+/** The parsed message of the service; a problem if the text is none of its messages.
  * @param {any} data */
 function messageOf(data) {
   try {
     const message = JSON.parse(data);
     if (message.next !== undefined || message.type || (message.box && message.frame !== undefined)) return message;
   } catch {
-    // It is told below.
+    // A message that is no JSON is reported below.
   }
   const detail = `The stream sent what is no answer of bagtrack: ${JSON.stringify(String(data).slice(0, 60))}`;
   return new Problem({ type: "", status: SWITCHED, detail });
@@ -120,7 +122,7 @@ export class FrameStream {
     globalThis.addEventListener?.("offline", this.offline);
     session.hold(this);
     this.resendFrom(session.frame + 1);
-    // The service may have these, of a stream before this one: it tells.
+    // The service may have these frames from an earlier stream; its first message tells.
     this.sent = this.waiting.length;
     this.connect();
   }
@@ -141,7 +143,7 @@ export class FrameStream {
       if (this.live) this.skip(box != null);
       this.waiting.push({ frame: own, header, resolve, reject });
       if (this.lost) {
-        // It was lost while there was nothing to send.
+        // The session was lost while no frame waited.
         this.downSince = Date.now();
         this.reopen(this.lost);
       } else this.transmit();
@@ -151,7 +153,7 @@ export class FrameStream {
   /** Of live frames that cannot be sent yet, the newest is kept. One with a box is skipped for another one with a box.
    * @param {boolean} hasBox Whether the newest has one. */
   skip(hasBox) {
-    // One that is being read is as good as sent: where reading takes longer than the next frame, none would be.
+    // A frame that is being read counts as sent: if reading took longer than the next frame, none would ever be sent.
     const unsent = Math.max(this.sent, this.waiting.findIndex((other) => other === this.reading) + 1);
     for (const older of this.waiting.splice(unsent)) {
       if (older.header.box && !hasBox) this.waiting.push(older);
@@ -183,7 +185,7 @@ export class FrameStream {
     const { socket } = this;
     if (!socket || (this.isUp && this.sent === 0)) return;
     const bytes = this.waiting.slice(0, this.sent).reduce((sum, sent) => sum + sentFrame(sent).length, 0);
-    // The service itself lets a frame wait for half of it.
+    // The service itself may let a frame wait for half of this time.
     this.silence = setTimeout(() => this.socket === socket && this.drop(), 2 * longest(bytes));
   }
 
@@ -242,7 +244,7 @@ export class FrameStream {
     const { id } = session;
     const origin = await session.takeOrigin();
     this.isRenewing = false;
-    // Frames go on meanwhile. Those that the snapshot may have must be answered before it is of use.
+    // Frames go on meanwhile, and the snapshot may include them: it is used once they are answered.
     if (origin && session.id === id) this.newer = { origin, until: session.frame + this.sent };
   }
 
@@ -256,12 +258,12 @@ export class FrameStream {
   /** @param {Problem} problem */
   refused(problem) {
     this.lastProblem = problem;
-    // The frame is not what is refused: the service closes the stream.
+    // The token was refused, not the frame: the service closes the stream next.
     if (problem.status === UNAUTHORIZED) return;
     if (problem.isGone) return this.gone(problem);
     if (this.outOfOrder > 0) {
       this.outOfOrder -= 1;
-      // All have come back: they are sent again with the numbers that they have now.
+      // All frames with wrong numbers were refused: they are sent again with their new numbers.
       if (this.outOfOrder === 0) this.sent = 0;
     } else {
       this.acknowledge()?.reject(problem);
@@ -278,7 +280,7 @@ export class FrameStream {
       const detail = "Another client has sent frames to this session.";
       return this.end(new Problem({ type: "replaced", status: 409, detail }));
     }
-    // Which of several live frames were skipped is not known, and newer ones come.
+    // It is not known which of the live frames were skipped; the oldest count as skipped, since newer ones matter more.
     if (this.live) this.waiting.splice(0, this.sent - known).forEach((skipped) => skipped.resolve(undefined));
     this.sent = known;
     this.outOfOrder = 0;
@@ -316,7 +318,7 @@ export class FrameStream {
     this.breakLine();
     this.newer = undefined;
     this.lost = problem;
-    // Without a frame that waits it need not be held at the service.
+    // While no frame waits, the session is not opened again: it would take up room at the service.
     if (this.waiting.length > 0) return this.reopen(problem);
     this.onLine(true);
   }
@@ -326,7 +328,7 @@ export class FrameStream {
   async reopen(problem) {
     this.lost = undefined;
     this.readings = 0;
-    // The first time at once.
+    // The first time the session is opened again without a pause.
     if (this.reopened > 0) {
       if (this.isLate) return this.end(problem);
       if (this.reopened >= MOST_TRIES) return this.end(noStream(LOSES));
@@ -369,7 +371,7 @@ export class FrameStream {
         this.closed(code);
       };
       socket.onclose = (event) => down(event.code);
-      // Not every platform closes a socket that could not be opened.
+      // Some platforms fire `error` but no `close` for a socket that could not be opened.
       socket.onerror = () => down(ABNORMAL);
       this.listen();
     } catch (error) {
@@ -400,14 +402,14 @@ export class FrameStream {
    */
   async closed(code) {
     if (this.isEnded) return;
-    // A token has ended. The key gives another one, unless it has ended, too: the call below tells.
+    // After 401 the token has expired. The key gives a new one, unless it has expired, too: the call below tells.
     const isFinal = code > OF_STATUS && code !== OF_STATUS + UNAUTHORIZED;
     if (isFinal) return this.refusedFor(this.reason(code - OF_STATUS));
     if (this.readings > 0 && (this.isLate || this.readings >= MOST_TRIES)) return this.end(noStream(NO_SOCKET));
     this.breakLine();
     await this.rest();
     if (this.isEnded) return;
-    // A page is not told why a stream cannot be opened; this call tells.
+    // Browsers do not tell why a WebSocket cannot be opened; the answer to this call does.
     const { transport } = this.session.client;
     const url = transport.at(`sessions/${this.session.id}`);
     const asked = transport.attempt("GET", url, {}).then((response) => documentOf(response, "frames"));
@@ -466,7 +468,7 @@ export class FrameStream {
     socket?.close();
     this.session.hold(undefined);
     const left = this.waiting.splice(0);
-    // The service may have these: they count, so a post or the next stream sends them again before its own.
+    // The service may have these frames, so they are kept: a post or the next stream sends them again before its own.
     const { kept, frame: last } = this.session;
     const sent = this.outOfOrder ? [] : left.slice(0, this.sent);
     sent.forEach((it, index) => kept.put({ number: last + 1 + index, frame: sentFrame(it), box: it.header.box }));

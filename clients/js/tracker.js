@@ -19,7 +19,7 @@ import { Frame, Parameters, Tracker as Wasm } from "./wasm/bagtrack_wasm.js";
  * @property {Record<string, unknown>} [parameters] Parameters that are set otherwise than in the preset.
  */
 
-/** What the tracker refuses, by how its words begin, and what the service calls that. */
+/** How the tracker's error messages begin, and the kinds that the service gives such problems. */
 const KINDS = /** @type {const} */ ([
   ["the box", "invalid-box"],
   ["the snapshot", "invalid-snapshot"],
@@ -38,7 +38,7 @@ export async function frameFor(image) {
   return refusing(() => frameOf(pixels));
 }
 
-/** Runs what may be refused.
+/** Runs `run`, and turns the tracker's errors into problems.
  * @template T
  * @param {() => T} run
  * @returns {T} */
@@ -58,7 +58,7 @@ function refusing(run) {
 /** @param {TrackerOptions} options */
 function parametersOf({ preset = "robust", seed, parameters = {} }) {
   const made = new Parameters(preset);
-  // The service draws and takes seeds of up to 53 bits.
+  // The draw has 32 bits; the service takes seeds of up to 53 bits.
   made.set("seed", seed ?? crypto.getRandomValues(new Uint32Array(1))[0]);
   for (const [name, value] of Object.entries(parameters)) made.set(name, typeof value === "number" ? value : NaN);
   if (seed !== undefined) made.set("seed", seed);
@@ -68,7 +68,7 @@ function parametersOf({ preset = "robust", seed, parameters = {} }) {
 /** @param {import("./image.js").Pixels | import("./image.js").Planes} image */
 function frameOf(image) {
   const { width, height } = image;
-  // The module would make whole numbers of 32 bits of anything.
+  // The module would convert any value to a whole number of 32 bits.
   if (![width, height].every((side) => side > 0 && side >>> 0 === side)) {
     const detail = "The width and height of an image are whole numbers from 1 on.";
     throw new Problem({ type: "frame-damaged", status: 422, detail });
@@ -93,7 +93,7 @@ function answerOf(estimate) {
   return { frame, box: { x, y, width, height }, score, status: /** @type {Answer["status"]} */ (status) };
 }
 
-/** Runs with a frame, which is made for it unless it is one.
+/** Runs `run` with a frame, which is made from the image unless that is one already.
  * @template T
  * @param {Image | Frame} image
  * @param {(frame: Frame) => T} run

@@ -1,10 +1,10 @@
-// Frames on their way to the worker.
+// Prepares frames to be sent to the worker.
 
 import { checkImage, className } from "./given.js";
 
 /** @typedef {import("./image.js").Image} Image */
 
-/** What no worker can be sent, unless as a bitmap. */
+/** The objects that can be sent to a worker only as a bitmap. */
 const DRAWN = ["HTMLCanvasElement", "OffscreenCanvas", "HTMLVideoElement", "HTMLImageElement"];
 
 /** The same frame, as it can be sent to a worker, and what is handed over to it.
@@ -22,8 +22,8 @@ export async function sendable(image) {
   return { sent, handed: [sent] };
 }
 
-/** Pixels or planes alone: what an `ImageData` tells by accessors would not be sent with it. Those that are parts of
- * larger buffers are copied: a message has the whole buffer of each array.
+/** A plain object with the pixels or planes, since properties that are accessors, as of an `ImageData`, are not sent.
+ * Arrays that are parts of larger buffers are copied: a message has the whole buffer of each array.
  * @param {import("./image.js").Pixels | import("./image.js").Planes} image
  * @returns {{sent: Image, handed: Transferable[]}} */
 function plain(image) {
@@ -31,7 +31,7 @@ function plain(image) {
   /** @type {Transferable[]} */
   const handed = [];
   const own = (/** @type {any} */ pixels) => {
-    // Shared memory is not copied at all.
+    // Shared memory is sent without a copy.
     if (!(pixels?.buffer instanceof ArrayBuffer) || pixels.byteLength === pixels.buffer.byteLength) return pixels;
     const copy = new Uint8Array(pixels);
     handed.push(copy.buffer);
@@ -44,6 +44,6 @@ function plain(image) {
 /** Gives up what was handed over.
  * @param {Image} image */
 export function close(image) {
-  // A caller's own object may have anything by that name.
+  // A caller's own object may have any property of this name.
   if ("close" in image && typeof image.close === "function") image.close();
 }

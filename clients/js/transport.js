@@ -54,7 +54,7 @@ export async function documentOf(response, ...members) {
     const document = JSON.parse(text);
     if (members.every((member) => document[member] !== undefined)) return document;
   } catch {
-    // It is told below.
+    // A text that is no JSON is reported below.
   }
   throw notUnderstood(response, text);
 }
@@ -66,7 +66,7 @@ export async function snapshotOf(response) {
   return new Uint8Array(await response.arrayBuffer());
 }
 
-/** Says what came in place of an answer, and from where.
+/** The problem that tells what came in place of an answer, and from where.
  * @param {Response} response
  * @param {string} text */
 function notUnderstood({ url, status, headers }, text) {
@@ -77,7 +77,8 @@ function notUnderstood({ url, status, headers }, text) {
   return new Problem({ type: "", status, detail });
 }
 
-/** The key without the line break of its file; or a refusal, which does not show it, since messages go into logs.
+/** The key without the line break at the end of its file. Throws for a bad key, without showing it: messages go into
+ * logs.
  * @param {string} key */
 function keyOf(key) {
   const own = key.trim();
@@ -85,30 +86,33 @@ function keyOf(key) {
   throw new TypeError("The key has characters that no header takes: it is one line of printable ASCII.");
 }
 
-/** After how many seconds trying again makes sense, where that is said: as a number, or by proxies as a date.
+/** The seconds of the header `Retry-After`, if it is there: it is a number, or from some proxies a date.
  * @param {Headers} headers */
 function retryAfter(headers) {
   const said = headers.get("retry-after") ?? "";
   const seconds = said ? Number(said) : NaN;
   if (Number.isFinite(seconds)) return seconds;
-  // The clock here may be wrong.
+  // Counted from the answer's own date, since the clock here may be wrong.
   const now = dateOf(headers.get("date")) ?? Date.now();
   const until = dateOf(said);
   return until && Math.max(0, (until - now) / 1000);
 }
 
-/** The three forms of a date in HTTP (RFC 9110, 5.6.7). Without them `parse` takes much for a date. */
+/**
+ * The three forms of a date in HTTP (RFC 9110, 5.6.7). Without this check, `Date.parse` takes many other texts for
+ * dates.
+ */
 const DATE = /^(\w{3}, \d\d \w{3} \d{4}|\w{6,9}, \d\d-\w{3}-\d\d) [\d:]{8} GMT$|^\w{3} \w{3} [ \d]\d [\d:]{8} \d{4}$/;
 
-/** Milliseconds; nothing where it is no date.
+/** The time in milliseconds; `undefined` if the text is no date.
  * @param {string | null} said */
 function dateOf(said) {
   if (!said || !DATE.test(said)) return undefined;
-  // The last form names no zone.
+  // The third form names no time zone; it is in GMT, too.
   return Date.parse(said.endsWith("GMT") ? said : `${said} GMT`) || undefined;
 }
 
-/** No answer came. Node.js tells why; browsers do not.
+/** The problem of a call without an answer. Node.js tells why there is none; browsers do not.
  * @param {any} error */
 function unreachable(error) {
   const { message } = error?.cause ?? {};
@@ -117,7 +121,7 @@ function unreachable(error) {
   return problem;
 }
 
-/** Whether it is the service's certificate, which another try would not mend.
+/** Whether the service's certificate was refused, which another try would not mend.
  * @param {Problem} problem */
 function isCertificateRefused({ cause }) {
   const { code } = /** @type {any} */ (cause)?.cause ?? {};
@@ -131,7 +135,7 @@ export class Transport {
    * @param {number} patience Milliseconds in which a call is made again.
    */
   constructor(url, key, patience) {
-    // `localhost:8080` is a URL, too, of the scheme `localhost`; `/service` and nothing at all are none.
+    // `localhost:8080` parses as a URL, with the scheme `localhost`; `/service` and the empty text do not parse.
     if (!/^\s*https?:/i.test(String(url)))
       throw new TypeError(`The address ${url} does not begin with http:// or https://.`);
     this.url = new URL(url);
@@ -162,7 +166,7 @@ export class Transport {
   async call(method, path, request = {}) {
     const patience = request.patience ?? this.patience;
     const backoff = new Backoff(patience);
-    // A line that was idle for long breaks at its next use: the first time nothing is meant by it.
+    // A connection that was idle for long may break at its next use: the first failure is tried again at once.
     let hasBroken = patience === 0;
     for (;;) {
       try {
@@ -200,10 +204,10 @@ export class Transport {
     const timer = setTimeout(() => attempt.abort(), longest(bytes));
     try {
       const response = await fetch(url, { method, body, headers, signal: attempt.signal });
-      // Read to its end here, where a line that breaks on the way is a failure to be tried again.
+      // The body is read here, so that a line that breaks meanwhile is a failure that is tried again.
       if (response.ok) {
         const whole = new Response(response.status === 204 ? null : await response.arrayBuffer(), response);
-        // Where it came from, after redirections, is not taken over.
+        // A new `Response` has no address; this is the answer's, after redirections.
         return Object.defineProperty(whole, "url", { value: response.url });
       }
       const problem = await response.json().catch(() => ({ title: response.statusText }));

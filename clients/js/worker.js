@@ -1,4 +1,4 @@
-// The worker: trackers by their numbers, and calls for them, one after the other.
+// The worker: has the trackers by the ids of their sessions, and does the calls one after the other.
 
 import { pictureOf } from "./bag.js";
 import { ofNode } from "./platform.js";
@@ -74,7 +74,7 @@ async function answered({ number, name, call }) {
     return { number, value: await calls[/** @type {keyof Calls} */ (name)](call) };
   } catch (error) {
     const { message, slug, status } = /** @type {Problem} */ (error);
-    // A module that has failed cannot be used again.
+    // After a trap the WebAssembly module cannot be used again.
     const isBroken = error instanceof WebAssembly.RuntimeError;
     return { number, problem: { type: slug ?? "internal", status: status ?? 500, detail: message }, isBroken };
   } finally {
@@ -91,10 +91,11 @@ function serve(port) {
     before = before.then(async () => port.postMessage(await answered(data)));
   });
   port.start?.();
-  // Messages that come before a worker listens are lost in some browsers.
+  // Some browsers lose messages that come before a worker listens, so it tells when it does.
   port.postMessage({ isReady: true });
 }
 
-// A worker of a browser has it, one of Node.js does not. Bundlers make workers in which no module can wait.
+// Workers of browsers have a global `postMessage`, those of Node.js do not. No top-level `await`: bundlers make workers
+// that do not allow it.
 if ("postMessage" in globalThis) serve(globalThis);
 else ofNode("worker_threads").then(({ parentPort }) => serve(parentPort));

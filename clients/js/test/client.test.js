@@ -59,7 +59,7 @@ async function answering(answer) {
   return { url, close };
 }
 
-// Of HTTP's three forms the first alone was read.
+// HTTP has three forms of a date (RFC 9110, 5.6.7).
 test("a date after which to try again is read in each of its forms", async () => {
   const dates = ["Sun, 06 Nov 1994 08:49:37 GMT", "Sunday, 06-Nov-94 08:49:37 GMT", "Sun Nov  6 08:49:37 1994"];
   const said = [...dates.map((date) => [date, 7]), ["Sunday"], ["11/6/94"]];
@@ -72,7 +72,7 @@ test("a date after which to try again is read in each of its forms", async () =>
   }
 });
 
-// It stayed there until it expired.
+// Otherwise the restored session would stay at the service until it expires.
 test("a session that cannot be read once it is restored is ended", async () => {
   const session = await new Client(service.url).open(clip.frames[0], clip.box, options);
   const snapshot = await session.snapshot();
@@ -176,7 +176,7 @@ test("a snapshot goes on under another id, a correction moves the box", async ()
   for (const frame of clip.frames.slice(1, 11)) await session.track(frame);
   const restored = await client.restore(await session.snapshot());
   assert.notEqual(restored.id, session.id);
-  // As sessions in the page tell them.
+  // A session has its last answer, however it was opened, as local sessions do.
   for (const same of [session, restored, await client.attach(session.id)]) sameAsTheLibrary([same], 10);
   const answers = [];
   for (const frame of clip.frames.slice(11, 31)) answers.push(await restored.track(frame));
@@ -200,7 +200,7 @@ test("a correction with a wrong box is refused, and nothing of it is kept", asyn
     await assert.rejects(session.correct(clip.frames[1], box), problem("invalid-box"), JSON.stringify(box));
     await assert.rejects(session.client.open(clip.frames[0], box), problem("invalid-box"), JSON.stringify(box));
   }
-  // A box that is changed while its call waits.
+  // The caller changes its box while the call waits.
   const box = { ...clip.box };
   const first = session.track(clip.frames[1]);
   const corrected = session.correct(clip.frames[2], box);
@@ -256,8 +256,8 @@ test("a full service is asked again, when it says so", async () => {
   }
 });
 
-// It was tried for 20 seconds as a service that cannot be reached, and again before each frame after it. A stream with it
-// ended the process.
+// A file that cannot be read is no failure of the service: it is not tried again, and neither the next frames nor a
+// stream fail because of it.
 test("a file may be removed once it was sent; one that was removed before is told at once", async () => {
   const folder = mkdtempSync(join(tmpdir(), "bagtrack-files-"));
   const fileOf = async (/** @type {number} */ frame) => {
@@ -353,7 +353,8 @@ test("a stream takes another token when its own ends, and ends with its key", as
 test("a session leaves a service that is about to end", async () => {
   const secret = { BAGTRACK_SNAPSHOT_KEYS: "a secret of this test" };
   const [first, second] = await Promise.all([startService([], secret), startService([], secret)]);
-  // As a balancer does: requests that open sessions go to a service that takes them, the others to their session's.
+  // A load balancer: a request with a new session's id goes to the service at `opensAt`, all others to that of their
+  // session.
   /** @type {Map<string, number>} */
   const ports = new Map();
   let opensAt = first.port;
@@ -379,7 +380,7 @@ test("a session leaves a service that is about to end", async () => {
       if (index === 8) {
         first.ask();
         while ((await fetch(`${first.url}/readyz`)).ok);
-        // It is the only one for now.
+        // The session has not heard yet that its service is about to end.
         assert.equal(session.isDraining, false);
       }
       if (index === 12) {

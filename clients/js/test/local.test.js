@@ -12,10 +12,10 @@ import { decodePng } from "./png.js";
 import { PROGRAM, SEED, startService } from "./service.js";
 
 const FRAMES = 100;
-/** Most pixels between a box here and one of the service. */
+/** The most pixels by which a side of a local box may differ from the service's. */
 const NEAR = 0.05;
 
-/** A clip without loss: its files, their pixels, and the first box.
+/** A losslessly encoded clip: its files, their pixels, and the first box.
  * @param {string} scene */
 function exactClip(scene) {
   const folder = mkdtempSync(join(tmpdir(), "bagtrack-clip-"));
@@ -128,7 +128,7 @@ test("what cannot be used is refused, and changes nothing", async () => {
   await assert.rejects(session.track({ ...images[1], data: images[1].data.subarray(4) }), slug("frame-damaged"));
   await assert.rejects(session.correct(images[1], { ...box, width: 1 }), slug("invalid-box"));
   await assert.rejects(local.open(images[0], { ...box, x: NaN }), slug("invalid-box"));
-  // Two corners, and shares of the frame.
+  // Boxes given by mistake as two corners, and as shares of the frame's sides.
   await assert.rejects(local.open(images[0], { x: 300, y: 200, width: 318, height: 238 }), /box=300,200,18,38/);
   await assert.rejects(session.correct(images[1], { x: 0.5, y: 0.5, width: 0.2, height: 0.2 }), /box=160,120,64,48/);
   await assert.rejects(local.open(images[0], box, { parameters: { particles: 1e6 } }), slug("invalid-parameter"));

@@ -53,7 +53,7 @@ test("posts go on from the last snapshot after the service was killed, and kille
     const { id } = session;
     const answers = [];
     for (const [index, frame] of clip.frames.slice(1, 41).entries()) {
-      // Before the first snapshot, after one, and right after one.
+      // The service loses the session before the first snapshot, some time after one, and right after one.
       if ([5, 27, 30].includes(index)) await service.restart();
       answers.push(await session.track(frame));
       assert.ok(session.kept.frames.length <= 10, `${session.kept.frames.length} frames are kept`);
@@ -152,7 +152,7 @@ test("a paused stream whose session expires holds none, and goes on with the nex
     const lines = /** @type {boolean[]} */ ([]);
     const stream = session.stream({ onLine: (isUp) => lines.push(isUp) });
     const answers = await Promise.all(clip.frames.slice(1, 16).map((frame) => stream.track(frame)));
-    // Up, and up again after the session has expired.
+    // Waits until the line is up for the second time, after the session has expired.
     while (lines.filter((isUp) => isUp).length < 2) await new Promise((resolve) => setTimeout(resolve, 20));
     assert.equal(await service.sessions(), 0);
     answers.push(...(await Promise.all(clip.frames.slice(16, 26).map((frame) => stream.track(frame)))));

@@ -16,7 +16,7 @@ function clientOf(url, { snapshot_every: snapshotEvery, retry_for: retryFor } = 
   return new Client(url, { snapshotEvery, patience: retryFor === undefined ? undefined : 1000 * retryFor });
 }
 
-/** Calls; what they give is in the words of the table. */
+/** Makes the calls of the table with this client, and gives their results in the words of the table. */
 class Caller {
   constructor(client) {
     this.client = client;
@@ -85,7 +85,7 @@ test("a frame that is sent again is what it was, also where its buffer has anoth
         request: `POST /sessions/{2}/frames?frame=${number}`,
       })),
     ];
-    // One of them in shared memory, which cannot be sent itself: the session would try it for ever.
+    // One of the buffers is shared memory, which `fetch` cannot send: the client has to send a copy.
     const buffers = [bytes("a"), new Uint8Array(new SharedArrayBuffer(1)), bytes("a").buffer];
     const filled = (/** @type {number} */ at, /** @type {string} */ text) => {
       new Uint8Array(/** @type {any} */ (buffers[at]).buffer ?? buffers[at]).set(bytes(text));
@@ -132,10 +132,10 @@ for (const [name, reply] of Object.entries(NO_ANSWERS)) {
         OPENED,
         posted(1, "b", reply),
         posted(1, "c", { status: 200, answer: 1 }),
-        // The first frame stays what opens the session again.
+        // The bad snapshot is dropped: the first frame still opens the session again.
         snapshot,
         posted(2, "d", lost),
-        // Nor is a frame that is sent again taken for one that has arrived.
+        // The bad answer to a frame that is sent again does not count: the frame is sent once more.
         posted(1, "c", reply),
         posted(1, "c", { status: 200, answer: 1 }),
         posted(2, "e", { status: 200, answer: 2 }),

@@ -34,7 +34,7 @@ export class ScriptedService {
     this.url = `http://127.0.0.1:${this.server.address().port}`;
   }
 
-  /** All requests were those of the script, and all of them came. */
+  /** Asserts that all requests of the script came, and no others. */
   check() {
     assert.deepEqual(this.complaints, []);
     assert.deepEqual(this.exchanges, [], "not asked");
@@ -60,7 +60,7 @@ export class ScriptedService {
     }
   }
 
-  /** The session's id, where the request is that of the exchange. */
+  /** Compares a request with that of the exchange. Returns the session's id if they agree. */
   compare(exchange, request, body) {
     const [method, target] = exchange.request.split(" ");
     const [wanted, came] = [target, request.url].map((path) => new URL(path, this.url));

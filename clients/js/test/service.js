@@ -52,7 +52,7 @@ export function sampleClip() {
     const names = readdirSync(join(folder, "img")).sort();
     const frames = names.map((name) => new Uint8Array(readFileSync(join(folder, "img", name))));
     const truth = readFileSync(join(folder, "groundtruth_rect.txt"), "utf8").split("\n")[0].split(",").map(Number);
-    // The file counts pixels from 1.
+    // The ground-truth file counts pixels from 1.
     const [x, y, width, height] = [truth[0] - 1, truth[1] - 1, truth[2], truth[3]].map((value) => Number(value.toFixed(1)));
     const box = { x, y, width, height };
     const flags = ["--box", [x, y, width, height].join(","), "--seed", String(SEED), "--format", "json"];
@@ -64,7 +64,7 @@ export function sampleClip() {
   }
 }
 
-/** A port that leads to another one, whose connections can be cut. While it is shut none are taken.
+/** A port that forwards to another one. Its connections can be cut, and while it is shut it takes none.
  * @param {number} port */
 export async function openLine(port) {
   const sockets = new Set();

@@ -88,7 +88,7 @@ test("what is no frame or no box is refused, and holds up none behind it", async
   const given = [buffer, new Blob([clip.frames[3]]), Buffer.from(clip.frames[4])].map((frame) => stream.track(frame));
   sameAsTheLibrary(await Promise.all([first, ...given]));
   stream.close();
-  // Nor is it kept where a post has no answer, for a stream to send it.
+  // A post refuses such frames, too, and does not keep them for a stream to send.
   for (const frame of wrong) await assert.rejects(session.track(frame), (error) => refused(error) === "unsupported-image");
 });
 
@@ -153,7 +153,7 @@ test("of live frames one that takes long to be read is not skipped for ever", as
 test("of live frames one with a box is skipped only for another one with a box", async () => {
   const session = await open();
   const [wrong, right] = [{ x: 10, y: 20, width: 40, height: 40 }, { x: 60, y: 20, width: 40, height: 40 }];
-  // All wait until the line is up.
+  // All frames wait until the line is up.
   const stream = session.stream({ live: true });
   const headers = [{}, { box: wrong }, { box: right }, {}, {}];
   const answers = await Promise.all(headers.map((header, at) => stream.track(clip.frames[at + 1], header)));
@@ -183,7 +183,7 @@ test("the end of the session ends the stream", async () => {
   const session = await client.open(clip.frames[0], clip.box, { seed: SEED });
   const stream = session.stream();
   await stream.track(clip.frames[1]);
-  // By somebody else: the next frame tells.
+  // Another client ends the session; the stream hears of it with its next frame.
   await (await client.attach(session.id)).end();
   const late = stream.track(clip.frames[2]);
   await assert.rejects(late, (error) => error instanceof Problem && error.slug === "session-not-found");
@@ -208,7 +208,7 @@ test("a newer stream takes the place of an older one", async () => {
   sameAsTheLibrary([await newer.track(clip.frames[2])], 2);
   const problem = await older.ended;
   assert.ok(problem instanceof Problem && problem.slug === "replaced", String(problem));
-  // One that comes too late is told why.
+  // A frame that comes after the end of the stream is refused with the same problem.
   await assert.rejects(older.track(clip.frames[2]), (error) => error === problem);
   newer.close();
 });
@@ -222,8 +222,8 @@ test("a service that has gone ends the stream when patience ends", async () => {
   await assert.rejects(stream.track(clip.frames[2]), (error) => error instanceof Problem && error.slug === "unreachable");
 });
 
-/** Lets pauses pass a hundred times as fast. No mocked clock: what clears the timers that it makes clears no other
- * one, and Node.js's own connections have some.
+/** Makes timers a hundred times as fast. Not with a mocked clock: its `clearTimeout` clears no real timers, and
+ * Node.js's own connections have some.
  * @param {import("node:test").TestContext} context */
 function hurry(context) {
   const set = globalThis.setTimeout;
@@ -231,7 +231,7 @@ function hurry(context) {
   context.mock.method(globalThis, "setTimeout", quick);
 }
 
-// A line that breaks without a word: it was waited for without end.
+// The line breaks, and neither an event nor an answer tells of it.
 test("a line that is silent is opened again", async (context) => {
   /** @type {WebSocket[]} */
   const sockets = [];
@@ -241,7 +241,7 @@ test("a line that is silent is opened again", async (context) => {
       sockets.push(this);
     }
     close() {
-      // Nor does it tell its end.
+      // This socket does not report its end either.
       this.onclose = null;
       super.close();
     }
@@ -251,14 +251,14 @@ test("a line that is silent is opened again", async (context) => {
   const answers = [await stream.track(clip.frames[1])];
   hurry(context);
   sockets[0].onmessage = null;
-  // First it is found silent, then opened again after a pause.
+  // The line is found silent after a while, then opened again after a pause.
   answers.push(await stream.track(clip.frames[2]));
   sameAsTheLibrary(answers);
   assert.equal(sockets.length, 2);
   stream.close();
 });
 
-// It was opened again and again, without end and without a word.
+// A proxy that refuses WebSockets: the client must not try for ever.
 test("a stream that a proxy does not let through ends when patience ends, and the session goes on", async () => {
   class Stopped extends WebSocket {
     constructor(/** @type {URL} */ url) {
@@ -274,7 +274,8 @@ test("a stream that a proxy does not let through ends when patience ends, and th
   sameAsTheLibrary([await session.track(clip.frames[1])]);
 });
 
-/** Leads what opens a session to one instance, and all else to another, which does not know it.
+/** A balancer that sends requests that open sessions to one instance, and all others to another one, which does not
+ * know the session.
  * @param {{port: number}} other */
 async function openBalancer(other) {
   const balancer = createServer((request, response) => {
@@ -313,7 +314,7 @@ test("a stream ends where each instance loses its session again, and opens not m
   }
 });
 
-// They went on without end, as those of the page.
+// With endless patience, as in the page, a stream must still end if none can be opened.
 test("streams of endless patience end where none can be had, and say why", async (context) => {
   class Stopped extends WebSocket {
     constructor(/** @type {URL} */ url) {
@@ -365,7 +366,7 @@ test("frames without an answer are sent again by the stream or the post that com
 
 test("a stream that is closed with frames on their way is followed by another one, or by posts", async () => {
   let heard = 0;
-  // Hears only so many messages.
+  // Passes only `heard` messages on.
   class Deaf extends WebSocket {
     set onmessage(/** @type {(event: MessageEvent) => void} */ hear) {
       this.addEventListener("message", (event) => (heard -= 1) >= 0 && hear(event));

@@ -53,7 +53,7 @@ test("what is no image here is refused, and ends no session", async () => {
 test("a call that cannot be sent fails alone", async () => {
   const client = new LocalClient();
   const session = await client.open(image, box, options);
-  // Of a canvas a bitmap is made, which fails here as for one without pixels.
+  // For a canvas the client makes a bitmap, which fails in Node.js as it does in a browser for a canvas without pixels.
   const canvas = { width, height, [Symbol.toStringTag]: "HTMLCanvasElement" };
   const gone = luma.slice();
   structuredClone(gone, { transfer: [gone.buffer] });
@@ -88,7 +88,7 @@ test("what is no image yet is told what to do with it", async () => {
     [{ width, height, luma: null }, /^Pixels are bytes/],
     [{ ...image, cb: [1], cr: [1] }, /^Pixels are bytes/],
     [video, /no pixels/],
-    // The size is known before the picture is there, and nothing would be drawn.
+    // The video's size is known, but no picture is loaded yet, so nothing would be drawn.
     [{ ...video, videoWidth: width, videoHeight: height, readyState: 1 }, /no pixels/],
     [{ width: 0, height: 0, [Symbol.toStringTag]: "ImageBitmap" }, /no pixels/],
     [{ naturalWidth: 0, naturalHeight: 0, width, height, [Symbol.toStringTag]: "HTMLImageElement" }, /no pixels/],
@@ -163,7 +163,7 @@ test("calls fail whose worker is ended by somebody else, and the next session ha
   const client = new LocalClient();
   const session = await client.open(image, box, options);
   const worker = await client.worker;
-  // The last one is still to be sent.
+  // The last call is not sent yet when the worker ends.
   const calls = [session.track(image), session.read(), client.open(image, box), session.snapshot()];
   const settled = Promise.allSettled(calls);
   await worker.terminate();
@@ -262,7 +262,7 @@ test("a module or a worker that cannot be loaded is told by name", async (contex
   await assert.rejects(parts.Tracker.create(image, box), told);
   await assert.rejects(client.open(image, box), told);
   await client.close();
-  // In place of a browser, which says nothing else.
+  // Stands in for a browser, whose error event has no message.
   const browser = /** @type {any} */ (globalThis);
   browser.Worker = class extends EventTarget {
     constructor() {
@@ -279,7 +279,7 @@ test("bundlers find the worker, and can put its modules into one script", () => 
   const text = (/** @type {string} */ name) => readFileSync(new URL(name, folder), "utf8");
   assert.ok(text("local.js").includes('new Worker(new URL("./worker.js", import.meta.url), { type: "module" })'));
   for (const name of readdirSync(folder).filter((file) => file.endsWith(".js"))) {
-    // As in a script: no import waits, nor does the module itself.
+    // The modules without their imports and exports must be a script, which has no top-level `await`.
     const script = text(name).replace(/^import .*$/gm, "").replace(/^export (?!\{)/gm, "").replace(/^export .*$/gm, "");
     assert.doesNotThrow(() => new Function(script.replaceAll("import.meta.url", '""')), name);
     assert.doesNotMatch(script, /["']node:/, `${name}: a bundler would look for it`);
@@ -310,7 +310,7 @@ test("a box that is none, a side that is none, and a tracker that was freed are 
 
 test("a tracker takes frames in the order of the calls, also where the first is read last", async (context) => {
   const bitmap = /** @type {any} */ (globalThis);
-  // In place of a browser: the first file is decoded last.
+  // Stands in for a browser that decodes the first file last.
   let first = true;
   bitmap.OffscreenCanvas = class {
     getContext() {
