@@ -1,4 +1,4 @@
-//! What one client has in use, against its quotas.
+//! A client's account: its quotas, and what it uses of them.
 //!
 //! Quotas are shares of what the service has: sessions and their bytes, requests in flight, streams, bytes of uploads,
 //! and frames and requests a second.
@@ -14,7 +14,7 @@ use std::num::NonZeroU32;
 use std::sync::Arc;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-/// What one client may have.
+/// The quotas of one client: the most that it may have of each.
 #[derive(Debug, Clone, Copy)]
 pub struct Quotas {
     pub sessions: usize,
@@ -26,7 +26,7 @@ pub struct Quotas {
 }
 
 impl Quotas {
-    /// What a client in these networks may hold.
+    /// The budgets of a client in these networks.
     fn holdings(&self, networks: &[Arc<Network>]) -> Holdings {
         let budget = |most, of: fn(&Holdings) -> &Budget| {
             Budget::of_client(
@@ -50,14 +50,13 @@ impl Quotas {
 #[derive(Debug)]
 pub struct Account {
     pub(super) client: Client,
-    /// The account of the API key, where this is the account of a page with a token of that key. The key's account
-    /// counts the frames.
+    /// For the account of a page, which has a token of an API key: the account of that key, which counts the frames.
     key: Option<Arc<Account>>,
     flow: Flow,
     pub(super) quotas: Quotas,
     pub(super) all: Holdings,
     pub(super) held: Holdings,
-    /// Keeps the networks' holdings known as long as one of their clients is.
+    /// Keeps the holdings of the client's networks as long as its account.
     _networks: Vec<Arc<Network>>,
     requests: Arc<Semaphore>,
     /// The places for decoding videos that a video of the client takes: its own, then those of its networks.
@@ -65,10 +64,10 @@ pub struct Account {
     messages: Arc<MessageRate>,
     asked: DefaultDirectRateLimiter,
     handshakes: DefaultDirectRateLimiter,
-    /// Held by the handshake that is next, so that others wait in order of arrival.
+    /// Held while the next handshake waits for the rate, so that the others wait in order of arrival.
     next_handshake: tokio::sync::Mutex<()>,
     frames: Option<FrameRate>,
-    /// Held by the request whose frame is counted next, so that others wait in order of arrival.
+    /// Held while the next frame waits for the rate, so that the others wait in order of arrival.
     next_frame: tokio::sync::Mutex<()>,
 }
 
@@ -134,8 +133,8 @@ impl Account {
         }
     }
 
-    /// Whether the account may be forgotten: nothing is held and, for a key, its whole burst of frames is left again.
-    /// Addresses are too many to remember the frames that they sent.
+    /// Whether the account may be forgotten: nothing is held and, for a key, its whole burst of frames is available
+    /// again. For addresses the frames are not waited for, since there may be very many addresses.
     pub(super) fn is_idle(&self) -> bool {
         if self.key.is_some() {
             return self.held.upload_bytes.held() == 0;
@@ -174,8 +173,8 @@ impl Account {
         )
     }
 
-    /// How many frames the client may send a second and at once, and how many it may send now; `None` where they are
-    /// not counted.
+    /// The client's frame rate with its burst, and how many frames it may send now; `None` where frames are not
+    /// counted.
     pub fn frames(&self) -> Option<(Rate, u32)> {
         let counting = self.counting_frames();
         Some((counting.quotas.frames?, counting.frames.as_ref()?.left()))
@@ -229,7 +228,7 @@ impl Account {
     /// Counts a request that takes no turn at the workers.
     ///
     /// # Errors
-    /// The client has sent too many lately.
+    /// The client has sent too many such requests lately.
     pub fn count_asked(&self) -> Result<(), RateExceeded> {
         let what = "requests a second for pages and states";
         rates::count_one(&self.asked, what, rates::ASKED)
@@ -238,7 +237,7 @@ impl Account {
     /// Takes a place for a stream.
     ///
     /// # Errors
-    /// The client has as many streams as it may, or as are left free.
+    /// The client has as many streams as it may, or as many as are free.
     pub fn stream(&self) -> Result<Charge, QuotaExhausted> {
         let mut place = Charge::new(&self.all.streams, &self.held.streams);
         let taken = place.grow(1);
@@ -287,10 +286,10 @@ impl Account {
         &self.held.upload_bytes
     }
 
-    /// Waits until one frame more may be counted, in order of arrival.
+    /// Counts one frame, once the rate allows it; callers wait in order of arrival.
     ///
     /// # Errors
-    /// No further frame may be counted until `deadline`.
+    /// The rate allows no further frame until `deadline`.
     pub async fn count_frame_in_order(&self, deadline: Instant) -> Result<(), RateExceeded> {
         let turn = timeout_at(deadline, self.counting_frames().next_frame.lock()).await;
         loop {
@@ -305,7 +304,7 @@ impl Account {
         }
     }
 
-    /// Counts frames of the client.
+    /// Counts frames against the client's frame rate.
     ///
     /// # Errors
     /// The client has sent too many frames lately.
@@ -332,7 +331,7 @@ impl RequestPermit {
     /// Counts the frames of the request.
     ///
     /// # Errors
-    /// The client has sent too many lately.
+    /// The client has sent too many frames lately.
     pub fn count_frames(&self, frames: usize) -> Result<(), RateExceeded> {
         self.account.count_frames(frames)
     }

@@ -1,4 +1,4 @@
-//! Who is one client, as far as quotas and turns go, and what is held for each and for all of them.
+//! Who counts as one client for quotas and turns, and the accounts of all clients.
 
 use super::account::{Account, Quotas};
 use super::video_places::VideoPlaces;
@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use uuid::Uuid;
 
-/// A client: who shares quotas and turns.
+/// A client: all its requests share quotas and turns.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Client {
     /// The name of an API key.
@@ -40,7 +40,7 @@ impl Client {
         address.into_iter().flat_map(wider_networks)
     }
 
-    /// The key, where one or a token of it came with the request.
+    /// The name of the client's API key; `None` for a client without a key.
     pub fn key(&self) -> Option<&Arc<str>> {
         match self {
             Self::Key(name) | Self::Page(name, _) => Some(name),
@@ -58,7 +58,7 @@ impl fmt::Display for Client {
     }
 }
 
-/// What is held: for all clients, for a network, or for one client.
+/// The budgets of all clients together, of a network, or of one client, with what is held of each.
 #[derive(Debug, Clone)]
 pub struct Holdings {
     /// Places of sessions: one for each target.
@@ -72,8 +72,8 @@ pub struct Holdings {
 }
 
 impl Holdings {
-    /// What all clients may hold together. With a store other sessions leave memory for new ones, so each client's own
-    /// quota is the only bound.
+    /// The budgets of all clients together. With a store, sessions leave memory for new ones, so only each client's own
+    /// quota bounds its sessions.
     pub(super) fn of_all(config: &Config, has_store: bool) -> Self {
         let of_memory = |most: usize| Budget::new(if has_store { usize::MAX } else { most });
         Self {
@@ -94,7 +94,8 @@ impl Holdings {
         budgets.iter().all(|budget| budget.held() == 0)
     }
 
-    /// What the clients of a network hold; the network has no maximum of its own besides what is free.
+    /// The budgets of a network, without a maximum of their own: a [`Charge`](bagtrack_sessions::Charge) bounds them by
+    /// what is free.
     pub(super) fn of_network() -> Self {
         let budget = || Budget::new(usize::MAX);
         Self {
@@ -129,7 +130,8 @@ pub struct Clients {
 }
 
 impl Clients {
-    /// No clients yet, with the quotas of this configuration. `has_store`: memory is only a cache of sessions.
+    /// No accounts yet, with the quotas of this configuration. `has_store` says that sessions are in a store, and
+    /// memory is a cache.
     pub fn new(config: &Config, has_store: bool) -> Self {
         let limits = &config.limits;
         let quarter = |share: Option<usize>, whole: usize| share.unwrap_or(whole.div_ceil(4));
@@ -190,7 +192,7 @@ impl Clients {
         account
     }
 
-    /// What all clients hold together.
+    /// The budgets of all clients together.
     pub fn all(&self) -> &Holdings {
         &self.all
     }

@@ -1,7 +1,7 @@
 //! What each client may use: sessions, requests and frames in a time, and work at once.
 //!
-//! In: who makes a request ([`Client`]). Out: the client's [`Account`], which gives a permit for the request, or says
-//! why not ([`QuotaExhausted`](bagtrack_sessions::QuotaExhausted), [`RateExceeded`]).
+//! In: the [`Client`] of a request. Out: the client's [`Account`], which gives a permit for the request, or an error
+//! that names the quota ([`QuotaExhausted`](bagtrack_sessions::QuotaExhausted), [`RateExceeded`]).
 //!
 //! What can go wrong: a client changes its address to count as new. IPv6 addresses count by their network, and the
 //! table of clients is bounded.

@@ -1,5 +1,5 @@
-//! How fast a client may send: fixed rates for what takes time of the network threads, and the configured rate of
-//! frames.
+//! How fast a client may send: the configured rate of frames, and fixed rates for messages, requests and handshakes,
+//! which take time of the network threads.
 
 use bagtrack_sessions::clock::{self, Instant};
 use governor::clock::{Clock, DefaultClock};
@@ -16,12 +16,12 @@ pub type Rate = (NonZeroU32, NonZeroU32);
 /// Frames of WebSockets, which carry messages: as many as some hundred cameras send, and so few that they take a
 /// network thread little time, whatever is in them.
 pub const MESSAGES: Rate = rate(10_000, 2_000);
-/// Requests that take no turn at the workers: more than pages of some people and their programs ask for, and so few
-/// that they take a network thread some percent of its time. The burst is the 70 files of the page for a dozen people
-/// behind one address.
+/// Requests that take no turn at the workers: more than the pages and programs of a few people send, and so few that
+/// they take a few percent of a network thread's time. The burst is the page's 70 files for a dozen people behind one
+/// address.
 pub const ASKED: Rate = rate(500, 1_000);
 /// TLS handshakes: in each the service signs, which takes a network thread milliseconds with a large RSA key. The burst
-/// is the cameras and pages of some dozen people behind one address.
+/// is enough for the cameras and pages of some dozen people behind one address.
 pub const HANDSHAKES: Rate = rate(25, 64);
 
 /// A client has sent too many of something lately.
@@ -41,12 +41,12 @@ pub struct RateExceeded {
 pub struct FrameRate {
     rate: Rate,
     limiter: RateLimiter<NotKeyed, InMemoryState, DefaultClock, StateInformationMiddleware>,
-    /// How many frames were left when some were counted last, and when that was.
+    /// How many frames were left at the last count, and the moment of that count.
     left: Mutex<(u32, Instant)>,
 }
 
 impl FrameRate {
-    /// A rate of which no frame is counted yet.
+    /// A frame rate whose whole burst is left.
     pub fn new(rate: Rate) -> Self {
         Self {
             rate,
@@ -74,7 +74,7 @@ impl FrameRate {
         }
     }
 
-    /// Frames that may be sent now: those left at the last count, and those regained since.
+    /// How many frames may be sent now: those left at the last count, and those that the rate has allowed since.
     pub fn left(&self) -> u32 {
         let (rate, burst) = self.rate;
         let noted = self.left.lock().unwrap_or_else(PoisonError::into_inner);
@@ -91,7 +91,7 @@ impl FrameRate {
     }
 }
 
-/// Counts one at a limiter of this rate; `what` names it in the error.
+/// Counts one event at a limiter of this rate; `what` names the events in the error.
 ///
 /// # Errors
 /// Too many were counted lately.

@@ -1,4 +1,4 @@
-//! The sessions of a client.
+//! The quota of a client's sessions.
 
 use super::account::Account;
 use bagtrack_sessions::{
@@ -7,7 +7,7 @@ use bagtrack_sessions::{
 };
 use std::sync::Arc;
 
-/// The quota of a client's sessions. A session takes a place for each of its targets.
+/// The session quota of an account. A session takes a place for each of its targets.
 #[derive(Debug)]
 pub struct ClientSessions(pub Arc<Account>);
 

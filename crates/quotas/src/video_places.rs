@@ -1,4 +1,4 @@
-//! Places for the processes that decode videos, and whether somebody waits for one.
+//! Places for the processes that decode videos. Whoever has a place can learn when another request waits for one.
 
 use bagtrack_sessions::clock::{Instant, sleep_until, timeout_at};
 use std::sync::Arc;
