@@ -11,7 +11,7 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 use tokio::sync::Notify;
 
-/// Moments of this module are counted from here.
+/// The fixed moment from which this module counts time.
 static START: LazyLock<Instant> = LazyLock::new(clock::now);
 
 const IDLE: u8 = 0;
@@ -53,8 +53,8 @@ impl Activity {
         self.idle.notify_one();
     }
 
-    /// Since when no request has been in progress, as the time from a fixed moment; `None` while one is, or where a
-    /// stream has the connection. A head that has begun is not yet a request.
+    /// When the connection became idle, as the time since a fixed moment; `None` while a request is in progress, or
+    /// where a stream has the connection. A request counts from the end of its head.
     pub fn idle_since(&self) -> Option<Duration> {
         let since = Duration::from_nanos(self.idle_since.load(Ordering::Relaxed));
         let is_idle = self.state.load(Ordering::Acquire) == IDLE && !self.is_stream();
@@ -111,8 +111,8 @@ impl Activity {
         })
     }
 
-    /// Notes that the request's body has ended. The rest of a refused body may end after its answer; then the state
-    /// stays.
+    /// Notes that the request's body has ended. If the request was refused, its body may end after its answer; the
+    /// state then stays.
     fn received(&self) {
         let (from, to) = (RECEIVING, ANSWERING);
         let _ = self
@@ -147,7 +147,7 @@ impl HttpBody for WatchedBody {
         cx: &mut Context<'_>,
     ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
         let polled = Pin::new(&mut self.body).poll_frame(cx);
-        // The reader of a request's body does not ask again after the last piece. The writer of an answer may.
+        // Whoever reads a request's body may not poll again after the last piece, so the body's own end counts, too.
         let is_last = matches!(polled, Poll::Ready(None)) || self.body.is_end_stream();
         if is_last && !self.ends_on_drop {
             self.end();

@@ -32,7 +32,7 @@ pub enum CertificateError {
         /// What the system says.
         source: io::Error,
     },
-    /// The file of the certificate has none.
+    /// The certificate's file has no certificate in PEM.
     #[error(
         "{path} (--tls-cert) has no certificate in PEM ({reason}): it must have the lines between \
          `-----BEGIN CERTIFICATE-----` and `-----END CERTIFICATE-----`; `openssl x509 -inform DER -in FILE` makes them \
@@ -44,7 +44,7 @@ pub enum CertificateError {
         /// What is wrong with it.
         reason: String,
     },
-    /// The file of the key has none that can be used.
+    /// The key's file has no private key in PEM that can be used.
     #[error(
         "{path} (--tls-key) has no private key in PEM that can be used ({reason}): `openssl pkey -in FILE -out FILE` \
          takes a passphrase off and makes PEM of other formats"
@@ -55,7 +55,7 @@ pub enum CertificateError {
         /// What is wrong with it.
         reason: String,
     },
-    /// The certificate and the key are not a pair, or of a kind that is not supported.
+    /// The certificate and the key are no pair, or their kind is not supported.
     #[error(
         "{cert} (--tls-cert) and {key} (--tls-key) cannot be used together: {reason}. The first certificate of the file \
          must be that of the key, of X.509 version 3, and ECDSA (P-256, P-384), RSA (2048 bits or more) or Ed25519"

@@ -1,8 +1,9 @@
-//! Whose a request is: the address of its client, behind trusted proxies, and of the customer that has the address.
+//! The address of a request's client, behind trusted proxies; and the addresses that belong to one customer of a
+//! provider.
 //!
-//! Proxies tell it by `Forwarded` (RFC 7239) or `X-Forwarded-For`. Each adds the address that it was called from at the
-//! end. So the list is read from its end, as long as the address before was a trusted proxy's: the first other address
-//! is the client's. What stands before that, the client may have written itself.
+//! Proxies tell the client's address in `Forwarded` (RFC 7239) or `X-Forwarded-For`. Each proxy adds the address that
+//! called it at the end of the list. So the list is read from its end: the first address that is no trusted proxy's is
+//! the client's. The client may have written all that is before it.
 //!
 //! A proxy that adds to one of the two headers passes the other one on as the client wrote it. So if both are there and
 //! disagree, neither is believed, and the client is the proxy.
@@ -34,7 +35,7 @@ pub fn client_address(peer: IpAddr, headers: &HeaderMap, trusted: &[IpNet]) -> I
     }
 }
 
-/// Whether a request has one of the two headers.
+/// Whether a request has `Forwarded` or `X-Forwarded-For`.
 pub fn is_forwarded(headers: &HeaderMap) -> bool {
     headers.contains_key(FORWARDED) || headers.contains_key(X_FORWARDED_FOR)
 }
@@ -94,8 +95,8 @@ const IPV6_PREFIX: u8 = 64;
 /// Prefix lengths of the wider networks that some customers get.
 const WIDER_PREFIXES: [u8; 2] = [48, 56];
 
-/// What the addresses of one customer have in common: an IPv4 address, or the first address of an IPv6 network of 64
-/// bits.
+/// The address that stands for all addresses of one customer: an IPv4 address itself, or the first address of its IPv6
+/// network of 64 bits.
 pub fn customer_address(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(address) => {

@@ -38,7 +38,7 @@ pub struct ConnectionIo {
     /// The least rate at which the client has to take answers.
     rate: LeastRate,
     half_close_timeout: Duration,
-    /// Set when the client has closed its side: since when, and what wakes the connection.
+    /// Set once the client has closed its side: the moment, and the timer that wakes the connection.
     half_closed: Option<(Instant, Pin<Box<Sleep>>)>,
 }
 

@@ -9,8 +9,8 @@
 //! client with the most connections that has an idle one loses its longest idle one. A connection with a request in
 //! progress is never closed for another one.
 //!
-//! Each has a [hold](ConnectionHold) on its place until it ends, whoever serves it: HTTP first, then perhaps a stream
-//! that takes it over.
+//! Each connection has a [hold](ConnectionHold) on its place until it ends: HTTP has it first, then perhaps a stream
+//! that takes the connection over.
 
 use super::activity::Activity;
 use super::client_address::{customer_address, wider_networks};
@@ -59,7 +59,7 @@ struct Open {
     counts: HashMap<Holder, usize>,
 }
 
-/// For whom connections are counted.
+/// A client or a network, whose connections are counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Holder {
     /// A client, by its [`customer_address`].
@@ -97,7 +97,7 @@ impl Connections {
         })
     }
 
-    /// Takes a place for a connection from `address`. One that is `shared` comes from a proxy that many clients use.
+    /// Takes a place for a connection from `address`, which is `shared` if it is that of a proxy with many clients.
     ///
     /// # Errors
     /// There is no place, and no idle connection to close for it.
@@ -236,7 +236,7 @@ impl ConnectionHold {
 
     /// Waits until the service asks its connections to end.
     pub async fn ending(&mut self) {
-        // Without its sender the service is gone.
+        // Without the sender the service has ended, too.
         let _ = self.ending.wait_for(|ending| *ending).await;
     }
 

@@ -35,10 +35,10 @@ const COPIES: usize = 2;
 /// How long to wait before memory is asked for again.
 const RETRY: Duration = Duration::from_millis(20);
 
-/// Time of its message that each frame uses up. Otherwise a message of empty frames would never end where the service
-/// is slower than the client.
+/// The part of its message's time that each frame uses up. Otherwise a message of empty frames would never end where
+/// the service is slower than the client.
 const FRAME_TIME: Duration = Duration::from_micros(100);
-/// Least time to wait for the frame rate: a shorter timer would cost more than the frames that it lets pass.
+/// Shortest wait for the frame rate: a shorter timer would cost more than the frames that it delays.
 const LEAST_WAIT: Duration = Duration::from_millis(5);
 
 /// Bit of a frame's first byte: this frame is the last of its message.
@@ -55,7 +55,7 @@ const LENGTH: u8 = 0x7F;
 #[error("the message is too slow")]
 pub struct MessageTooSlow;
 
-/// The rest of a client's frame that was not handed over yet.
+/// A frame of the client, of which a part is still to be handed over.
 #[derive(Debug)]
 struct Frame {
     /// The first byte of its head.
@@ -69,7 +69,7 @@ struct Frame {
 pub struct Rates {
     /// Least bytes a second.
     pub bytes: LeastRate,
-    /// The time of a whole message, of which its bytes pay some back.
+    /// The time that a whole message may take; each byte of payload pays some of it back.
     pub message: LeastRate,
     /// Most frames a second, for all streams of the client.
     pub messages: Arc<MessageRate>,
@@ -82,7 +82,8 @@ pub struct Fragments<S> {
     /// Bytes that were read and not handed over.
     input: BytesMut,
     frame: Option<Frame>,
-    /// The head of the next fragment, as far as it was not handed over, and how many bytes of its payload follow.
+    /// The part of the next fragment's head that is still to be handed over; `fragment_left` bytes of payload follow
+    /// it.
     head: ArrayVec<u8, 8>,
     fragment_left: usize,
     budgets: [Budget; 2],
@@ -92,7 +93,7 @@ pub struct Fragments<S> {
     messages: Arc<MessageRate>,
     retry: Pin<Box<Sleep>>,
     rate: LeastRate,
-    /// The whole time of a message.
+    /// The time left for the whole message.
     deadline: LeastRate,
     /// Whether a message has begun and not ended.
     is_within: bool,

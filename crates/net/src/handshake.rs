@@ -1,4 +1,4 @@
-//! From an accepted connection to one that is ready for HTTP: with TLS, after the handshake.
+//! Makes an accepted connection ready for HTTP: does the handshake of a service with TLS.
 //!
 //! The first byte of a client shows whether it speaks plain HTTP to a service with TLS. Other routes then tell the
 //! client the right address.

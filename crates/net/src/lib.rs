@@ -1,7 +1,7 @@
 //! The connections of a service: how many there are, what each is doing, and how slowly its client may read and write.
 //!
-//! In: sockets. Out: the bytes of requests, and of WebSockets' messages ([`Fragments`]), for whom serves them; and
-//! whose they are ([`client_address()`]).
+//! In: sockets. Out: streams of bytes for HTTP and for WebSockets ([`Fragments`]), and the address of each request's
+//! client ([`client_address()`]).
 //!
 //! What can go wrong: a client sends its head or reads its answer slowly, opens many connections, keeps idle ones, or
 //! begins large messages on many streams. [`LeastRate`] and the time limits for handshakes and heads bound the first,
