@@ -4,10 +4,11 @@
 //! frames, or to all frames of the last request where these are more. Out: a [`Session`] in the [`Registry`], found by
 //! its id.
 //!
-//! [`SessionService`] is the one door. A request for a session takes these steps: [`SessionService::find`] finds it for
-//! its owner, [`Session::enter`] takes one of its few permits, [`Charge::grow`] charges the bytes of its body as they
-//! arrive, [`Admission::enter`] takes a place in the queue before the workers, and [`SessionService::advance`] waits
-//! for the session in order of arrival, and works with a copy of its state on a worker thread.
+//! All requests go through [`SessionService`]. A request for a session takes these steps: [`SessionService::find`]
+//! finds it for its owner, [`Session::enter`] takes one of its few permits, [`Charge::grow`] charges the bytes of its
+//! body as they arrive, [`Admission::enter`] takes a place in the queue before the workers, and
+//! [`SessionService::advance`] waits for the session in order of arrival, and works with a copy of its state on a
+//! worker thread.
 //!
 //! What can go wrong, and what is done about it:
 //! - Requests wait for the map. Its lock is held for a look-up only, never during work, and nothing is freed under it.

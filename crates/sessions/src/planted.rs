@@ -1,7 +1,7 @@
 //! Faults that a simulation must find. They exist only in builds with the feature `planted-faults`, and a thread has
 //! one at a time.
 
-/// A fault of the code. Some are in the scripts of a Redis alone.
+/// A fault of the code. Some faults are in the scripts for a Redis alone.
 #[cfg_attr(not(feature = "redis"), allow(dead_code))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PlantedFault {
@@ -49,7 +49,7 @@ impl PlantedFault {
         Self::BeginsWithoutFence,
     ];
 
-    /// Whether this thread has this fault.
+    /// Whether this fault is planted in this thread.
     #[cfg(feature = "planted-faults")]
     pub(crate) fn is_here(self) -> bool {
         HERE.get() == Some(self)

@@ -26,7 +26,7 @@ pub enum NoSession {
     /// No frame came for too long.
     #[error("the session has expired")]
     Expired,
-    /// The store has no record of it, and its time was not over.
+    /// The store has no record of the session, though its time to live was not over.
     #[error("the store has lost the session")]
     Lost,
 }
@@ -74,7 +74,7 @@ impl Registry {
         self
     }
 
-    /// The error where there is no room for one more session.
+    /// The error for want of room for one more session.
     pub(super) fn full(&self) -> TooManySessions {
         TooManySessions(self.max_sessions)
     }

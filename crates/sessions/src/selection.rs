@@ -19,7 +19,7 @@ pub struct Selection<T> {
     key_rows: Option<Vec<Numbered<T>>>,
 }
 
-/// What is known of a target so far.
+/// A target's rows that may still be written, and whether it has ended.
 #[derive(Debug)]
 struct Target<T> {
     key_frames: KeyFrames<Numbered<T>>,
@@ -86,7 +86,7 @@ impl<T> Selection<T> {
         now
     }
 
-    /// Whether no row is wanted any more.
+    /// Whether no target's rows are wanted any more.
     pub fn has_ended(&self) -> bool {
         self.targets.iter().all(|target| target.has_ended)
     }

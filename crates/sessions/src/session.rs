@@ -39,7 +39,7 @@ pub struct Opening {
     pub request: [u8; 32],
     /// The answer: that of frame 0, or of the snapshot's frame.
     pub estimates: Estimates,
-    /// When the session was to expire, in seconds since 1970.
+    /// When the session expires without a frame, as its opening request was told: in seconds since 1970.
     pub expires: u64,
     /// A random number, which tells apart sessions that had one id after the other.
     pub incarnation: u64,
@@ -242,8 +242,8 @@ impl Session {
         self.expires_ms.store(expires, Ordering::Relaxed);
     }
 
-    /// The session expires an idle time from now, or later where it would. For a frame that was taken, or that only the
-    /// service is to blame for not taking.
+    /// Lets the session live at least its idle time from now. For a frame that was taken, or that was refused for want
+    /// of room or time.
     pub fn renew(&self) {
         let expires = milliseconds(self.clock.now() + self.idle);
         self.expires_ms.fetch_max(expires, Ordering::Relaxed);

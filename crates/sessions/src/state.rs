@@ -1,4 +1,5 @@
-//! What work on a session changes: the trackers, and the answers that a repeated request gets again.
+//! The part of a session that its frames change: the trackers, and the stored answers, which a repeated request gets
+//! again.
 
 use super::replay::{self, Answered, Fingerprint, ReplayError, TargetAnswer};
 use super::scheduler::work_limit::{Stopped, WorkMeter};
@@ -105,7 +106,7 @@ impl SessionState {
         replay::stored(&self.recent, number, posted).map(Answered::estimates)
     }
 
-    /// Stores new answers, and keeps older ones as long as there are no more than `kept` in all.
+    /// Stores all new answers, and keeps the newest of the older ones, up to `kept` in all.
     pub(super) fn store(&mut self, answered: Vec<Answered>, kept: usize) {
         let older = kept.saturating_sub(answered.len()).min(self.recent.len());
         self.recent.drain(..self.recent.len() - older);
@@ -129,7 +130,7 @@ impl SessionState {
     ) -> Result<Answered, TargetsError> {
         let frame = Arc::new(frame);
         let advanced = self.targets.advance(&frame, correction, meter, seen);
-        // Another worker may not have dropped its clone yet. Then the frame's memory is not used again.
+        // If another worker still has a clone of the frame, its memory is not recycled.
         if let Some(frame) = Arc::into_inner(frame) {
             bagtrack_ingest::recycle(frame);
         }

@@ -172,7 +172,7 @@ impl Targets {
         boxes.try_map(start).map(Self)
     }
 
-    /// These trackers, if they see frames of one size and keep no more than they may.
+    /// These trackers, if all have frames of one size and together keep no more bytes than a session may.
     pub(super) fn restored(trackers: PerTarget<Tracker>) -> Option<Self> {
         let targets = Self(trackers);
         let all = targets.0.as_slice();

@@ -39,7 +39,7 @@ impl WorkPanicked {
 /// Why work has no outcome.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NoOutcome {
-    /// The work was not begun: the client's requests wait too long for a worker.
+    /// The work was refused before it began: the client's requests wait too long for a worker.
     #[error("the client's requests wait too long")]
     Overload,
     /// The work panicked.
@@ -153,7 +153,7 @@ impl Admission {
                 }
                 Box::new(move || {
                     drop(turn);
-                    // Nobody receives it if the client has gone.
+                    // If the client has gone, nobody receives the outcome.
                     let _ = send.send(outcome);
                 })
             });

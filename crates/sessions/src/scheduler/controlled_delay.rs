@@ -12,7 +12,7 @@ use std::time::Duration;
 /// In each interval of this length a queue has to be short once. A burst of this length is worked off in order.
 const INTERVAL: Duration = Duration::from_millis(500);
 
-/// How long the oldest request of a flow waits.
+/// Whether a flow's requests wait too long, judged by the wait of its oldest request.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct ControlledDelay {
     /// When this interval ends.
@@ -32,7 +32,7 @@ pub(super) enum Order {
     Oldest,
     /// The newest.
     Newest,
-    /// The oldest is refused, and then this is asked again.
+    /// The oldest request is to be refused, and then [`ControlledDelay::order`] to be called again.
     Refuse,
 }
 
@@ -90,7 +90,7 @@ mod tests {
     fn a_burst_is_worked_off_and_a_queue_that_stays_is_cut() {
         let mut delay = ControlledDelay::default();
         assert_eq!(order(&mut delay, 10_000, 10_490, LATE), Order::Oldest);
-        // The queue was short once.
+        // The queue was short once in the interval.
         assert_eq!(order(&mut delay, 10_490, 10_500, TARGET), Order::Oldest);
         assert_eq!(order(&mut delay, 10_500, 11_000, LATE), Order::Oldest);
         assert_eq!(order(&mut delay, 11_000, 11_500, LATE), Order::Refuse);

@@ -76,7 +76,7 @@ impl fmt::Debug for Executor {
 pub(super) enum CpuClock {
     /// The processor time of the thread that asks.
     Thread,
-    /// All work counts as taking none.
+    /// All work counts as taking no processor time.
     Still,
 }
 
@@ -137,7 +137,7 @@ struct Shared {
 #[derive(Default)]
 struct State {
     waiting: VecDeque<Work>,
-    /// One for each idle thread, in the order in which they became idle.
+    /// The slots of the idle threads, in the order in which these became idle.
     idle: Vec<Arc<ParkingSlot>>,
     closed: bool,
 }
@@ -189,8 +189,8 @@ impl fmt::Debug for Workers {
 }
 
 impl Shared {
-    /// The main loop of a thread. It counts as idle before it does what comes after a job, so a job that this starts is
-    /// done on the same thread.
+    /// The main loop of a thread. The thread counts as idle before it runs a job's [`AfterWork`], so a job that this
+    /// starts runs on the same thread.
     fn serve(&self, niceness: i32) {
         lower_priority(niceness);
         let slot = Arc::new(ParkingSlot::default());

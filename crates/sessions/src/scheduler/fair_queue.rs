@@ -188,7 +188,7 @@ impl FairQueue {
                 match state.next() {
                     Some(Next::Served(flow, length, class, give)) => (flow, length, class, give),
                     Some(Next::Refused(give)) => {
-                        // Dropping it wakes up the refused request. The lock must be free then.
+                        // Dropping `give` wakes up the refused request, for which the lock must be free.
                         drop(state);
                         drop(give);
                         continue;
@@ -226,13 +226,13 @@ impl WorkerSlot {
         self.cpu
     }
 
-    /// Work begins on this thread.
+    /// Notes that the request's work begins on this thread.
     pub(super) fn begin(&mut self) {
         let now = self.cpu.now();
         (self.began, self.checked) = (Some(now), now);
     }
 
-    /// How the worker was used so far. `ends` says whether work on several frames has ended.
+    /// The worker's use so far. `ends` says whether work on several frames has ended.
     fn held(&mut self, ends: bool) -> Held {
         let Some(began) = self.began else {
             return Held {
@@ -366,7 +366,7 @@ mod tests {
         let queue = FairQueue::new(1, Duration::ZERO);
         let mut short = given(&mut queue.ask(Flow(1), Job::Single));
         let mut other = queue.ask(Flow(2), Job::Batch);
-        // If it gave way, it would wait for ever: the other's work ends on this thread.
+        // If this work gave way, it would wait for ever, because the other work ends on this thread.
         short.yield_to_others();
         drop(short);
         drop(given(&mut other));

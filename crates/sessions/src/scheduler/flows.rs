@@ -69,7 +69,7 @@ pub(super) struct Request<G> {
     pub(super) since: Option<Duration>,
 }
 
-/// What becomes of the request whose turn it is.
+/// The outcome for the request whose turn it is.
 #[derive(Debug)]
 pub(super) enum Next<G> {
     /// The request gets a worker of this class.
@@ -101,7 +101,7 @@ pub(super) enum SizeClass {
     Large,
 }
 
-/// How much work a request is.
+/// How many frames a request has, and whether its work has begun.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Job {
     /// One frame, or work without a frame.
@@ -383,7 +383,7 @@ impl<G> Default for Waiting<G> {
 mod tests {
     use super::*;
 
-    /// A flow has a worker for single work of this time.
+    /// Gives a flow a worker for work on one frame that takes this time.
     fn work<G>(flows: &mut Flows<G>, flow: u64, millis: u64) -> SizeClass {
         let flow = Flow(flow);
         let waiting = flows.enter(flow, Duration::ZERO);
@@ -519,7 +519,7 @@ mod tests {
         flows.wait(Flow(flow), Job::Single, flow, since);
     }
 
-    /// The flow that is served next. Its work takes a millisecond.
+    /// Serves the next flow with work of a millisecond, and returns that flow.
     fn served(flows: &mut Flows<u64>) -> u64 {
         let Some(Next::Served(flow, _, class, request)) = flows.next() else {
             panic!("a request waits, and none is refused");

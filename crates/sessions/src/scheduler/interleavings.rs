@@ -37,7 +37,7 @@ fn assert_happened(seen: &Seen, what: &str) {
     assert!(times > 0, "in no order: {what}");
 }
 
-/// How many works have a worker of each class, of which there are `most`.
+/// Counts the jobs that have a worker of each class; there are `most` workers of each.
 struct AtWork {
     most: usize,
     now: [AtomicUsize; 2],

@@ -3,9 +3,9 @@
 //! In: work on frames, with the client that it is for. Out: its result, after it ran on a worker thread.
 //!
 //! What can go wrong: there is more work than the workers do ([`Admission::enter`](admission::Admission::enter) refuses
-//! it), a client sends more of it than its turns are ([`fair_queue`] gives the others theirs, and what waits too long
-//! is [refused](controlled_delay)), or one request costs too much ([`work_limit`] stops it between two frames). Work
-//! whose client has gone keeps its permits until it has ended.
+//! it), one client sends more work than its share ([`fair_queue`] still gives the others their turns, and requests that
+//! wait too long are [refused](controlled_delay)), or one request costs too much ([`work_limit`] stops its work between
+//! two frames). Work whose client has gone keeps its permits until it has ended.
 
 pub(crate) mod admission;
 pub(crate) mod budget;

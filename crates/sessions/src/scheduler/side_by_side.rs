@@ -18,7 +18,7 @@ pub(super) struct Parts<T, R, F> {
     step: F,
     cpu: CpuClock,
     state: Mutex<State<T, R>>,
-    /// A thread has ended its part.
+    /// Notified when a thread has ended its part.
     ended: Condvar,
 }
 

@@ -166,7 +166,7 @@ impl WorkMeter<'_> {
     /// Whether the work may go on. Waits while requests of clients with a better claim have its worker.
     ///
     /// # Errors
-    /// It may not; the value says why.
+    /// The work has to stop, for the reason that the error gives.
     pub fn check(&mut self) -> Result<(), Stopped> {
         let limit = self.limit;
         self.turn.yield_to_others();

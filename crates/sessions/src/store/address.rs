@@ -1,11 +1,11 @@
-//! Where the store is: one value that is like a URL.
+//! The address of a store, as one setting gives it: `file:DIR`, or the URL of a Redis.
 
 #[cfg(feature = "redis")]
 use super::redis::{RedisAddress, RedisAddressError};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// The text is no address of a store. It is not repeated, since it may hold a password.
+/// The text is no address of a store. The error does not show the text, which may have a password in it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AddressError {
     /// The text begins with `file:`, and names no folder.
@@ -40,7 +40,7 @@ impl StoreAddress {
         let Some(folder) = text.strip_prefix("file:") else {
             return Self::parse_shared(text, timeout);
         };
-        // What follows two slashes would be a host.
+        // After two slashes comes a host, which has to be empty.
         let folder = match folder.strip_prefix("//") {
             Some(path) if path.starts_with('/') => path,
             Some(_) => return Err(AddressError::NoFolder),

@@ -17,7 +17,8 @@ const LAST_MOMENT: u64 = 253_402_300_799;
 /// No session lives longer without a frame: a hundred years, so that the moment of its end can be written.
 pub(super) const MAX_TTL: Duration = Duration::from_secs(100 * 366 * 24 * 3600);
 
-/// Names a session. The id alone does not: after the session has ended, another one may be opened under it.
+/// The unique name of a session. The id alone is not unique: after a session has ended, another one may be opened under
+/// its id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct SessionName {
     /// Its id.
@@ -26,8 +27,8 @@ pub struct SessionName {
     pub incarnation: u64,
 }
 
-/// Which state of a record a replica has. The store in a folder writes this type as it is, so the fields are part of
-/// its format.
+/// Which version of a record a replica's copy of the session goes on from. The store in a folder writes this type as it
+/// is, so the fields are part of its format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Version {
     /// Goes up when a replica takes over a record whose last frames it does not have, or opens a stream.

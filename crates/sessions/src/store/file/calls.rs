@@ -1,4 +1,4 @@
-//! The store's calls, which go to its thread.
+//! The calls of the store, which are sent to its thread.
 
 use super::super::record::{Record, SessionName, Version};
 use super::super::session_store::{

@@ -1,4 +1,4 @@
-//! What each client has in the store, of the sessions that this process opened.
+//! The sessions that each client has in the store, as far as this process opened them.
 //!
 //! A session may leave memory and stay in the store, so its place there is counted apart: until it is ended, or until
 //! its record has expired, which is looked up when there is no room.

@@ -17,12 +17,12 @@ use tokio::sync::oneshot;
 
 /// Most calls that are written together.
 const GROUP: usize = 256;
-/// Least time between two looks for what has expired.
+/// Least time between two sweeps of expired entries.
 const SWEEP: Duration = Duration::from_secs(1);
 /// Least and most time before a database that failed is opened again.
 const REOPEN: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(4));
 
-/// What the thread tells those who call it.
+/// The thread's state that its callers read.
 #[derive(Debug, Default)]
 pub(super) struct Health {
     pub(super) is_up: AtomicBool,
