@@ -135,7 +135,7 @@ impl From<FrameFault> for FramesError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the client has as many {what} as it may, {limit}")]
 pub struct QuotaExhausted {
-    /// What the client has too many of, in the plural.
+    /// The things of which the client has too many, such as "sessions".
     pub what: &'static str,
     /// How many the client may have.
     pub limit: usize,

@@ -61,7 +61,7 @@ impl GivenBox {
 /// The answers to frames.
 #[derive(Debug)]
 pub struct Tracked {
-    /// One for each frame, in the order of the frames.
+    /// The answers, one for each frame, in the order of the frames.
     pub estimates: Vec<Estimates>,
     /// Whether these are the stored answers to a request that was sent again.
     pub replayed: bool,

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use tokio::sync::Mutex as AsyncMutex;
 use uuid::Uuid;
 
-/// What a client calls a session before it is open.
+/// The name that a client gives to the session that it opens.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum CreationKey {
     /// An idempotency key. Each owner has keys of its own.

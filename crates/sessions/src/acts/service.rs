@@ -18,7 +18,7 @@ use std::time::Duration;
 #[derive(Debug, Clone)]
 pub struct SessionService(Arc<ServiceParts>);
 
-/// What a request may take, and how sessions are kept.
+/// The limits of a request's work, and of what is stored of a session.
 #[derive(Debug, Clone)]
 pub struct ServiceSettings {
     /// Most time that one request may take, waiting included.

@@ -21,7 +21,7 @@ pub enum TrackFrom {
 /// The answers to frames without a session.
 #[derive(Debug)]
 pub struct TrackedAway {
-    /// One for each frame, in the order of the frames.
+    /// The answers, one for each frame, in the order of the frames.
     pub estimates: Vec<Estimates>,
     /// The track up to there, signed.
     pub snapshot: Vec<u8>,

@@ -53,7 +53,7 @@ impl Executor {
         }
     }
 
-    /// What measures the processor time of its work.
+    /// The clock of the processor time of this executor's work.
     pub(super) fn cpu_clock(&self) -> CpuClock {
         match self.0 {
             Kind::Threads(_) => CpuClock::Thread,
@@ -71,7 +71,7 @@ impl fmt::Debug for Executor {
     }
 }
 
-/// What measures the processor time of work.
+/// The clock of the processor time of work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum CpuClock {
     /// The processor time of the thread that asks.
@@ -123,7 +123,7 @@ fn thread_cpu_time() -> Duration {
 
 /// Work of a request. It returns what is to be done once its thread can be given the next work. Neither may panic.
 pub type Work = Box<dyn FnOnce() -> AfterWork + Send>;
-/// What is to be done after [`Work`], on its thread.
+/// A job that follows [`Work`] on the same thread.
 pub type AfterWork = Box<dyn FnOnce()>;
 
 /// The threads. When this is dropped each ends after its current job, once no job waits.

@@ -98,7 +98,7 @@ impl FairQueue {
             let Some(worker) = state.worker_for(&state.flows[&flow], length) else {
                 return state.wait(flow, length, give, since);
             };
-            // This request has not waited, which controlled delay has to know.
+            // Tells controlled delay that this request has not waited.
             state.order(flow, since);
             state.serve(flow, length, worker);
             worker
@@ -221,7 +221,7 @@ impl WorkerSlot {
         self.class
     }
 
-    /// What measures the processor time of the work.
+    /// The clock of the processor time of the work.
     pub(super) fn cpu(&self) -> CpuClock {
         self.cpu
     }

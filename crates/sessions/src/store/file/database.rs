@@ -34,10 +34,10 @@ const SWEPT_ROWS: usize = 1024;
 /// About the bytes that an entry without a state takes in memory, with the map's own.
 pub(super) const ENTRY_BYTES: u64 = 128;
 
-/// The reason where the database was removed, or its disk is not there.
+/// The reason of failed calls where the database was removed, or its disk is gone.
 pub(super) const GONE: &str = "the store's files are not there any more";
 
-/// A key that is no session's id.
+/// A key that is no session's id, for writes of the store itself.
 const NO_SESSION: [u8; 1] = [0];
 
 /// Why a folder cannot be used as a store.
@@ -65,7 +65,7 @@ pub enum OpenError {
         /// What the database says.
         reason: String,
     },
-    /// Another version of the database wrote it.
+    /// Another version of the database wrote the folder.
     #[error(
         "the store in {0} was written by another version of this program: start that one, or move the folder away"
     )]
@@ -95,8 +95,8 @@ impl OpenError {
     }
 }
 
-/// Whether an error comes from the system. One that comes from a file's content is damage, as is a file that is
-/// missing, should not be there, or is so short that the database seeks to before its beginning (`InvalidInput`).
+/// Whether an error comes from the system. All other errors mean damage: a file has bad content, is missing, should not
+/// be there, or is so short that the database seeks to before its beginning (`InvalidInput`).
 fn is_of_system(error: &io::Error) -> bool {
     use io::ErrorKind as Kind;
     match error.kind() {
@@ -209,8 +209,8 @@ impl Database {
             .cache_size(CACHE_BYTES)
             .worker_threads(1)
             .open()?;
-        // Above this limit the database asks its worker at each write, whose queue may be full. So there is no limit,
-        // and `account` lets it write tables.
+        // Above this limit the database calls its worker at each write, and the worker's queue may be full. So there is
+        // no limit, and `account` starts the writing of tables.
         let options = || KeyspaceCreateOptions::default().max_memtable_size(u64::MAX);
         Ok(Self {
             folder: folder.to_owned(),
@@ -223,7 +223,7 @@ impl Database {
             compaction: None,
             is_closing: Arc::default(),
             inner,
-            // What is in the journal is in memory again: it goes to tables with the first write.
+            // The journal's content is in memory again, and goes to tables with the first write.
             written_bytes: MEMTABLE_BYTES,
             dropped_bytes: 0,
         })
@@ -284,7 +284,7 @@ impl Database {
         Ok(())
     }
 
-    /// Drops what has expired. Returns whether there may be more.
+    /// Drops expired entries. Returns whether there may be more of them.
     pub(super) fn sweep(&mut self, now: u64) -> fjall::Result<bool> {
         let snapshot = self.inner.read_tx();
         let mut sweep = self.begin(now);
@@ -376,7 +376,7 @@ pub(super) struct Transaction<'a> {
     pub(super) written: Written,
 }
 
-/// What a transaction writes.
+/// Counts of what a transaction writes.
 #[derive(Default)]
 pub(super) struct Written {
     /// Whether an answer promises that something written here is kept.
@@ -420,7 +420,7 @@ fn compact(tables: &[Keyspace], is_closing: &AtomicBool) -> fjall::Result<()> {
 /// Writes what is in memory to tables.
 fn write_tables(table: &Keyspace, is_closing: &AtomicBool) -> fjall::Result<()> {
     table.rotate_memtable()?;
-    // The database has no call that waits for its worker and can be interrupted.
+    // Polls, because the database has no interruptible call that waits for its worker.
     while table.sealed_memtable_count() > 0 && !is_closing.load(Ordering::Acquire) {
         sleep(Duration::from_millis(10));
     }

@@ -1,4 +1,4 @@
-//! Where the Redis is.
+//! The address of a Redis.
 
 use super::scripts::ScriptServer;
 use redis::cluster::ClusterClient;
@@ -19,19 +19,19 @@ pub struct RedisAddress(pub(super) Kind);
 pub(super) enum Kind {
     /// One server.
     Server(Box<Client>),
-    /// Nodes of a cluster, from which the others are found.
+    /// Some nodes of a cluster, which tell the others.
     Cluster(Box<ClusterClient>),
     /// A program that stands in for a Redis.
     Given(Arc<dyn ScriptServer>),
 }
 
 impl RedisAddress {
-    /// Reads `redis://[user:password@]host[:port][/database]`, with `rediss` for TLS, `valkey` and `valkeys` in their
-    /// place, `unix:///path`, or `redis-cluster://…` and its like, with more nodes as `host:port` after commas. Calls
-    /// to a cluster take at most `timeout`.
+    /// Reads `redis://[user:password@]host[:port][/database]`, with `rediss` for TLS, `valkey` and `valkeys` with the
+    /// same meanings, `unix:///path`, or `redis-cluster://…`, `rediss-cluster://…` and so on, with further nodes as
+    /// `host:port` after commas. Calls to a cluster take at most `timeout`.
     ///
     /// # Errors
-    /// The text is none of these. It is not repeated, since it may hold a password.
+    /// The text is none of these. The error does not show the text, which may have a password in it.
     pub fn parse(text: &str, timeout: Duration) -> Result<Self, RedisAddressError> {
         let failed = |error: redis::RedisError| {
             let reason = match error.kind() {

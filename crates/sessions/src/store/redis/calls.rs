@@ -17,17 +17,18 @@ use std::sync::{Arc, Weak};
 use std::time::Duration;
 use uuid::Uuid;
 
-/// How long a state stays in the server where the script that commits it did not run.
+/// How long an uploaded state stays at the server if the script that commits it does not run.
 const UNCOMMITTED: Duration = Duration::from_secs(10);
 /// How long the secret stays after a session was last opened with an idempotency key.
 const SECRET: Duration = Duration::from_secs(30 * 24 * 3600);
 /// How long a client's sessions are counted after it opened the last one.
 const COUNTED: Duration = Duration::from_secs(7 * 24 * 3600);
-/// Most sessions of a client that are looked at together, where it has no room for another.
+/// If a client has no room for a new session, so many of its sessions at a time are checked for whether they still
+/// live.
 const LOOKED_AT: usize = 32;
-/// How often [`LOOKED_AT`] sessions are looked at before another one is refused.
+/// How often [`LOOKED_AT`] sessions are checked before the new session is refused.
 const MAX_LOOKS: usize = 4;
-/// How long a client for which no room was found in this way is refused without looking again.
+/// How long the client is then refused without another check.
 const REFUSED: Duration = Duration::from_secs(1);
 /// How often the store is asked whether it is there.
 const PROBE: Duration = Duration::from_millis(250);
@@ -44,9 +45,9 @@ struct Shared {
     scripts: Scripts,
     prefix: String,
     clock: Clock,
-    /// Whether it has no room for new sessions.
+    /// Whether the store has no room for new sessions.
     is_full: AtomicBool,
-    /// Until when, by the clock, clients are refused without looking for room again.
+    /// For each refused client, the moment by the clock until which it is refused without another check.
     refused: Mutex<HashMap<String, Duration>>,
 }
 
@@ -60,7 +61,7 @@ impl Shared {
     }
 }
 
-/// Finds out whether the store is there, as long as somebody uses it.
+/// Asks the store every [`PROBE`] whether it is there, as long as somebody uses it.
 async fn probe(store: Weak<Shared>) {
     while let Some(store) = store.upgrade() {
         store.probe().await;
@@ -138,8 +139,7 @@ impl RedisStore {
         format!("{}:client:{name}", self.0.prefix)
     }
 
-    /// Counts a session. Where the client has no room for it, returns those of its sessions that were looked at longest
-    /// ago.
+    /// Counts a session. If the client has no room for it, returns those of its sessions that were checked longest ago.
     async fn try_admit(
         &self,
         share: &StoreShare,
@@ -164,7 +164,7 @@ impl RedisStore {
             .is_some_and(|until| *until > now)
     }
 
-    /// Refuses a client for [`REFUSED`] without looking for room again.
+    /// Refuses a client for [`REFUSED`] without another check.
     fn refuse(&self, client: &str) {
         let now = self.0.clock.now();
         let mut refused = lock(&self.0.refused);
@@ -308,7 +308,8 @@ impl SessionStore for RedisStore {
         script.arg(name.incarnation).arg(milliseconds(ttl));
         Box::pin(async move {
             let ended = self.0.connection.call(script).await?;
-            // The session's client has room again. Which one that is, is not known here, so all are looked at again.
+            // The session's client has room again. Its name is not known here, so all refused clients are checked
+            // again.
             lock(&self.0.refused).clear();
             Ok(ended)
         })

@@ -85,7 +85,7 @@ impl Connection {
         self.is_up() && !self.refuses.load(Ordering::Acquire)
     }
 
-    /// Whether the last call got an answer, a refusal too.
+    /// Whether the last call got an answer; a refusal is one.
     fn is_up(&self) -> bool {
         self.is_up.load(Ordering::Acquire)
     }
@@ -131,7 +131,7 @@ impl Connection {
                     }
                     return Err(StoreUnavailable(error.to_string()));
                 }
-                // A connection over which nothing comes may be dead without knowing it.
+                // A connection over which nothing comes may be dead without an error.
                 Ok(Err(error)) if error.is_timeout() => {
                     reason = Some(error);
                     self.replace(number);

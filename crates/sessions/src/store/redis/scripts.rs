@@ -1,10 +1,10 @@
 //! The scripts that Redis runs, each as a whole.
 //!
-//! KEYS: the record's, and that of the mark that its session was ended. In a cluster all keys of a session are at one
-//! node.
+//! KEYS: the key of the record, and the key of the mark that the session was ended. In a cluster all keys of a session
+//! are at one node.
 //!
-//! They answer `{0}` where there is no record, `{1, ttl}` where what was asked for was done, `{2, ttl, record}` where
-//! the record has another version, and `{3}` where the session was ended.
+//! Scripts answer `{0}` where there is no record, `{1, ttl}` where what was asked for was done, `{2, ttl, record}`
+//! where the record has another version, and `{3}` where the session was ended.
 
 use crate::planted::PlantedFault;
 use bytes::Bytes;
@@ -16,7 +16,7 @@ use std::time::Duration;
 /// A hash with one field, which is made in one transaction with a script.
 #[derive(Debug, Clone)]
 pub struct NewHash {
-    /// Its key.
+    /// The hash's key.
     pub key: String,
     /// The name of the field.
     pub field: &'static str,
@@ -135,7 +135,7 @@ fn transaction(new: &NewHash, script: &ScriptInvocation<'_>) -> Pipeline {
     transaction
 }
 
-/// Says that there is no record, and whether its session was ended.
+/// Answers for a missing record: whether its session was ended.
 const ABSENT: &str = r"
 local function absent()
   if redis.call('EXISTS', KEYS[2]) == 1 then return {3} end
@@ -235,7 +235,7 @@ if generation ~= ARGV[1] or frame ~= ARGV[2] then return tell(key, ARGV[3] == '1
 return {1, redis.call('PTTL', key)}
 ";
 
-/// ARGV: generation, frame. The next generation begins where they are the newest.
+/// ARGV: generation, frame. If the record has this version, the next generation begins.
 const FENCE: &str = r"
 local key = KEYS[1]
 local generation, frame = unpack(redis.call('HMGET', key, 'generation', 'frame'))
@@ -245,7 +245,7 @@ redis.call('HINCRBY', key, 'generation', 1)
 return {1, redis.call('PTTL', key)}
 ";
 
-/// ARGV: a secret, milliseconds to live after it was asked for last. Answers the secret that came first.
+/// ARGV: a new secret, milliseconds for which the key lives after each call. Answers the secret of the first call.
 const SECRET: &str = r"
 local secret = redis.call('GET', KEYS[1])
 if secret then
@@ -256,10 +256,10 @@ redis.call('SET', KEYS[1], ARGV[1], 'PX', ARGV[2])
 return ARGV[1]
 ";
 
-/// KEYS: that of a client, whose members are its sessions as `id:incarnation:places:bytes`, by the time (in
-/// milliseconds) when they were looked at last. ARGV: member, time, most places, most bytes, milliseconds to keep the
-/// key, most members to answer. Answers whether the session is counted and, where it is not, the members that were
-/// looked at longest ago.
+/// KEYS: the key of a client, a sorted set of its sessions as `id:incarnation:places:bytes`, with the time (in
+/// milliseconds) when each was checked last. ARGV: member, time, most places, most bytes, milliseconds to keep the key,
+/// most members to answer. Answers whether the session is counted and, where it is not, the members that were checked
+/// longest ago.
 const ADMIT: &str = r"
 local places, bytes = 0, 0
 local function count(member)
@@ -276,18 +276,19 @@ redis.call('PEXPIRE', KEYS[1], ARGV[5])
 return {1, {}}
 ";
 
-/// KEYS: that of a client. ARGV: a member of it, and when its session was looked at; 0 where it has ended.
+/// KEYS: the key of a client. ARGV: a member of its set, and the time when its session was checked; 0 if the session
+/// has ended.
 const RECOUNT: &str = r"
 if ARGV[2] == '0' then return redis.call('ZREM', KEYS[1], ARGV[1]) end
 return redis.call('ZADD', KEYS[1], 'XX', ARGV[2], ARGV[1])
 ";
 
-/// KEYS: a record's. ARGV: incarnation. Answers whether the session lives.
+/// KEYS: the key of a record. ARGV: incarnation. Answers whether the session lives.
 const LIVES: &str = r"
 return redis.call('HGET', KEYS[1], 'incarnation') == ARGV[1]
 ";
 
-/// Whether the store takes writes. Answers whether it has no room for new sessions.
+/// Fails if the store takes no writes. Answers whether it has no room for new sessions.
 const PROBE: &str = r"
 redis.call('HSET', KEYS[1], 'token', '')
 redis.call('PEXPIRE', KEYS[1], 1000)
