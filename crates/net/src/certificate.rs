@@ -17,7 +17,7 @@ const PROTOCOL: &[u8] = b"http/1.1";
 /// Why there is no certificate to show.
 #[derive(Debug, thiserror::Error)]
 pub enum CertificateError {
-    /// One of the two files is not named.
+    /// Only one of the two files, certificate and key, is named.
     #[error(
         "a certificate needs its key: give both --tls-cert (BAGTRACK_TLS_CERT) and --tls-key (BAGTRACK_TLS_KEY)"
     )]

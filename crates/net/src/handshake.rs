@@ -37,7 +37,7 @@ pub enum Security {
     Tls(Certificate),
 }
 
-/// What a connection turned out to be.
+/// The kind of a connection, as its first bytes show.
 #[derive(Debug)]
 pub enum Begun {
     /// A connection for the service's requests.
