@@ -83,7 +83,6 @@ impl Start {
             Fingerprint::of(file),
             boxes,
             params,
-
             expert.filter(|_| params.takes_expert()),
             check,
         );
