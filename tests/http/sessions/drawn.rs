@@ -136,13 +136,15 @@ async fn a_large_frame_is_drawn_smaller_with_its_box_in_place() {
 
 #[tokio::test]
 async fn a_frame_of_another_size_is_refused_before_it_is_decoded() {
-    let (app, id) = TestApplication::with_session().await;
-    let path = format!("/sessions/{id}/frames");
     // If the service decoded this file, the problem would be the damage.
     let mut damaged = pictures::png_of(64, 48);
     let middle = damaged.len() / 2;
     damaged[middle] ^= 0xFF;
-    for frame in [crate::helpers::heavy::bomb(), damaged] {
+    // Made before the session, which would expire meanwhile on a busy machine.
+    let frames = [crate::helpers::heavy::bomb(), damaged];
+    let (app, id) = TestApplication::with_session().await;
+    let path = format!("/sessions/{id}/frames");
+    for frame in frames {
         let request = app
             .request(Method::POST, &path, &[("draw", "")])
             .body(frame);
